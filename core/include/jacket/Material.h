@@ -1,0 +1,59 @@
+#pragma once
+#include <optional>
+#include <span>
+#include <string_view>
+
+namespace jacket {
+
+/// What a caller says about a sheet's material. Isotropic; SI units.
+struct ShellMaterial {
+    double young = 1e7;    ///< Young's modulus E [Pa], > 0
+    double poisson = 0.3;  ///< Poisson's ratio nu [-], -1 < nu <= 0.5 (a sheet in plane stress may be incompressible)
+    double thickness = 1e-3;  ///< t [m], > 0
+    double density = 1000.0;  ///< rho [kg/m^3], > 0
+
+    /// Measured values of fabrics, whose yarns make the formulas for a solid sheet too stiff. Each replaces what would
+    /// follow from the four numbers above.
+    std::optional<double> stretchStiffnessOverride{};  ///< E t [N/m], > 0
+    std::optional<double> bendingStiffnessOverride{};  ///< D [N m], >= 0
+    std::optional<double> areaDensityOverride{};       ///< rho t [kg/m^2], > 0
+
+    double stiffnessDamping = 0.0;  ///< beta [s], >= 0: damping force -beta K v
+    double massDamping = 0.0;       ///< alpha [1/s], >= 0: damping force -alpha M v
+
+    double stretchStiffness() const;  ///< E t [N/m]
+    double bendingStiffness() const;  ///< D = E t^3 / (12 (1 - nu^2)) [N m]
+    double areaDensity() const;       ///< rho t [kg/m^2]
+};
+
+/// Throws std::invalid_argument naming field, value and rule, e.g. "ShellMaterial.thickness [m] must be > 0, got
+/// -0.001".
+void validate(const ShellMaterial& material);
+
+/// Textbook materials. `thickness` [m] is of the sheet; fabrics have a usual one.
+namespace materials {
+ShellMaterial cotton();
+ShellMaterial denim();
+ShellMaterial silk();
+ShellMaterial leather(double thickness = 1.5e-3);
+ShellMaterial paper(double thickness = 1e-4);
+ShellMaterial cardboard(double thickness = 5e-4);
+ShellMaterial rubber(double thickness = 1e-3);
+ShellMaterial aluminium(double thickness);
+ShellMaterial steel(double thickness);
+ShellMaterial copper(double thickness);
+ShellMaterial pet(double thickness = 1e-4);
+
+/// One line of the table of presets: `source` says where the figures come from.
+struct Preset {
+    std::string_view name;
+    double usualThickness;  ///< [m]
+    ShellMaterial (*make)(double thickness);
+    std::string_view source;
+};
+std::span<const Preset> presets();
+ShellMaterial byName(
+    std::string_view name);  ///< at its usual thickness; throws std::invalid_argument with the nearest name
+}  // namespace materials
+
+}  // namespace jacket
