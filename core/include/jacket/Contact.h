@@ -1,0 +1,76 @@
+#pragma once
+#include <array>
+#include <span>
+#include <vector>
+
+#include "jacket/Types.h"
+
+/// Everything that the solver and the collision code say to each other.
+namespace jacket {
+
+/// A rigid body that takes part in the shells' solve. Twists are (velocity of the centre of mass, angular velocity).
+struct CoupledBody {
+    Vec3 position = Vec3::Zero();  ///< centre of mass at the start of the step [m]
+    Mat6 mass =
+        Mat6::Zero();  ///< blockdiag(m I, R I R^T); rigid contacts that hold the body may be added as stiff terms
+    Vec6 freeTwist = Vec6::Zero();  ///< w*: what it would do without the shells, the coming gravity included
+    double radius = 0.0;            ///< of a ball around `position` that holds the body [m]
+    const void* key = nullptr;      ///< the same from step to step: whose contacts to remember
+    bool prescribed = false;        ///< static, kinematic or sleeping: moves with freeTwist whatever the shells do
+    Vec6 twist = Vec6::Zero();      ///< out: solved twist at the end of the step
+    Vec6 impulse = Vec6::Zero();    ///< out: what the shells gave it, about its centre of mass [N s, N m s]
+};
+
+/// Where a piece of a shell meets a body: one vertex (weights 1 0 0), or a point of an edge or triangle.
+struct Contact {
+    int shell = 0;                  ///< index in the island
+    int feature = 0;                ///< id that stays the same while the same piece touches: see `Feature`
+    int body = 0;                   ///< index of the body
+    std::array<int, 3> vertices{};  ///< of the shell; for a vertex contact all three the same
+    Vec3 weights{1, 0, 0};          ///< barycentric, >= 0, sum 1
+    Vec3 normal{0, 1, 0};           ///< unit, out of the body
+    Vec3 point{0, 0, 0};            ///< on the body's surface [m]
+    double gap = 0.0;               ///< signed distance minus contact thickness at the queried configuration [m]
+    double friction = 0.0;          ///< Coulomb coefficient of the pair [-]
+    bool isVertex() const { return weights.x() == 1.0; }
+};
+
+/// A vertex tied to a point of a body.
+struct Anchor {
+    int shell = 0, vertex = 0, body = 0;
+    Vec3 point{0, 0, 0};  ///< where the body has that point at the start of the step [m]
+};
+
+/// What a contact did during the step, on the shell; the body got the opposite.
+struct ContactImpulse {
+    Contact contact;
+    Vec3 impulse{0, 0, 0};  ///< [N s]
+    bool sticks = false;    ///< friction held it
+};
+
+/// Feature ids: vertices, then edges, then triangles of the half-edge mesh.
+struct Feature {
+    static int vertex(int v) { return v; }
+    static int edge(int e, int vertexCount) { return vertexCount + e; }
+    static int triangle(int t, int vertexCount, int edgeCount) { return vertexCount + edgeCount + t; }
+};
+
+/// Where everything is when contacts are asked for: shells at `positions`, every body moved by `twists` for `time`.
+struct ContactPose {
+    std::span<const Points* const> positions;  ///< one per shell of the island
+    std::span<const Vec6> twists;              ///< one per body
+    double time;                               ///< 0 at the start of the step, h at its end [s]
+};
+
+/// The collision code, as the solver sees it.
+class ContactDetector {
+  public:
+    virtual ~ContactDetector() = default;
+    /// Appends every vertex contact whose gap is at most `vertexReach` [m] at that pose, and every contact of an edge
+    /// or triangle whose gap is at most `faceReach` (-infinity: none); at most one contact per feature and body, the
+    /// deepest.
+    virtual void find(const ContactPose& pose, double vertexReach, double faceReach,
+                      std::vector<Contact>& contacts) = 0;
+};
+
+}  // namespace jacket

@@ -1,0 +1,36 @@
+#pragma once
+#include <memory>
+#include <span>
+
+#include "jacket/Shell.h"
+
+namespace jacket {
+
+/// Everything that one solve couples: shells that share bodies, and those bodies.
+struct IslandInput {
+    double h = 1.0 / 60.0;       ///< length of the step [s], > 0
+    Vec3 gravity{0, -9.81, 0};   ///< [m/s^2]
+    const Wind* wind = nullptr;  ///< none: no air
+    std::span<Shell* const> shells{};
+    std::span<CoupledBody> bodies{};  ///< `twist` and `impulse` are written
+    std::span<const Anchor> anchors{};
+    ContactDetector* contacts = nullptr;  ///< none: no contacts
+};
+
+/// Solves for the velocities of one step: A v = b with contacts as filter, bodies as six unknowns each (see
+/// core/README.md). Keeps its memory from step to step. Positions do not move: call Shell::advance when the bodies have
+/// moved too.
+class IslandSolver {
+  public:
+    IslandSolver();
+    ~IslandSolver();
+    IslandSolver(IslandSolver&&) noexcept;
+    IslandSolver& operator=(IslandSolver&&) noexcept;
+    StepReport solve(const IslandInput& input);
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> m_impl;
+};
+
+}  // namespace jacket

@@ -1,0 +1,242 @@
+#include "jacket/Island.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "ShellAssembly.h"
+#include "contact/ContactResponse.h"
+#include "solver/FilteredPcg.h"
+
+namespace jacket {
+namespace {
+
+/// From a body's centre of mass to where the shell touches it, at the start of the step.
+Vec3 contactArm(const IslandInput& input, const Contact& contact) {
+    Vec3 arm = -input.bodies[contact.body].position;
+    for (int a = 0; a < 3; ++a)
+        arm += contact.weights[a] * input.shells[contact.shell]->positions().col(contact.vertices[a]);
+    return arm;
+}
+
+}  // namespace
+
+struct IslandSolver::Impl {
+    CoupledSystem system;
+    CoupledPreconditioner preconditioner;
+    FilteredPcg pcg;
+    ContactResponse response;
+    std::vector<int> offsets, dynamicIndex;
+    std::vector<int> dynamicBodies;  ///< index in IslandInput.bodies of each dynamic body
+    Points v, start, y;              ///< all shells
+    Points lastChange;               ///< dv of the last step: the warm start
+    Points unfiltered;               ///< (b - A v) at the solution, soft rows included
+    CoupledVector u, reference;
+    Eigen::Matrix<double, 6, Eigen::Dynamic> freeTwist;
+
+    void gather(const IslandInput& input);
+    void assemble(const IslandInput& input, bool atEnd);
+    bool overstretches(const IslandInput& input) const;
+    void solveStep(const IslandInput& input, StepReport& report);
+    double floorOfReference(const IslandInput& input) const;
+    void solveRounds(const IslandInput& input, StepReport& report);
+    void store(const IslandInput& input, StepReport& report);
+    void balance(const IslandInput& input, std::vector<ContactImpulse>& impulses);
+};
+
+IslandSolver::IslandSolver() : m_impl(std::make_unique<Impl>()) {}
+IslandSolver::~IslandSolver() = default;
+IslandSolver::IslandSolver(IslandSolver&&) noexcept = default;
+IslandSolver& IslandSolver::operator=(IslandSolver&&) noexcept = default;
+
+StepReport IslandSolver::solve(const IslandInput& input) {
+    if (!(input.h > 0.0) || !std::isfinite(input.h))
+        throw std::invalid_argument("IslandInput.h [s] must be > 0 and finite");
+    Impl& s = *m_impl;
+    StepReport report;
+    s.gather(input);                                          // one numbering for all shells
+    s.response.begin(input, s.offsets, s.dynamicIndex, s.y);  // contacts at the start, alteration y
+    s.solveStep(input, report);                               // A, b; filtered PCG until the contacts agree
+    if (!s.u.allFinite()) {                                   // state untouched; the caller decides
+        report.finite = report.converged = false;
+        return report;
+    }
+    s.store(input, report);  // velocities, twists, reactions
+    return report;
+}
+
+void IslandSolver::Impl::gather(const IslandInput& input) {
+    offsets.clear();
+    int count = 0;
+    for (const Shell* shell : input.shells) {
+        offsets.push_back(count);
+        count += shell->vertexCount();
+    }
+    start.resize(3, count);
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        start.middleCols(offsets[k], input.shells[k]->vertexCount()) = input.shells[k]->velocities();
+    y.setZero(3, count);
+    dynamicIndex.assign(input.bodies.size(), -1);
+    dynamicBodies.clear();
+    for (std::size_t b = 0; b < input.bodies.size(); ++b) {
+        if (input.bodies[b].prescribed) continue;
+        dynamicIndex[b] = static_cast<int>(dynamicBodies.size());
+        dynamicBodies.push_back(static_cast<int>(b));
+    }
+    if (lastChange.cols() != count) lastChange.setZero(3, count);
+}
+
+/// One linear solve, as Baraff & Witkin have it. Only where it has stretched an edge far beyond what it was, which the
+/// linearisation at the start did not see coming (an unstressed sheet resists no motion out of its plane), it is
+/// linearised again at the end that it found.
+void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report) {
+    constexpr int kMostNewtonSteps = 5;
+    assemble(input, false);
+    for (int newton = 1;; ++newton) {
+        solveRounds(input, report);
+        if (newton == kMostNewtonSteps || !u.allFinite() || !overstretches(input)) return;
+        assemble(input, true);
+    }
+}
+
+bool IslandSolver::Impl::overstretches(const IslandInput& input) const {
+    constexpr double kMost = 0.1;  // growth of an edge in one step, in rest lengths
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        const Shell& shell = *input.shells[k];
+        const Points &x = shell.positions(), &rest = shell.restPositions();
+        for (const auto& e : shell.mesh().edges()) {
+            const Vec3 now = x.col(e.v1) - x.col(e.v0);
+            const Vec3 then = now + input.h * (v.col(offsets[k] + e.v1) - v.col(offsets[k] + e.v0));
+            const double length = (rest.col(e.v1) - rest.col(e.v0)).norm();
+            if (then.norm() > std::max(now.norm(), length) + kMost * length) return true;
+        }
+    }
+    return false;
+}
+
+void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
+    std::vector<CoupledSystem::ShellPart> parts;
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        const int n = input.shells[k]->vertexCount();
+        const Points ahead = atEnd ? Points(v.middleCols(offsets[k], n)) : Points();
+        const StepSystem& step =
+            input.shells[k]->m_assembly->assemble(*input.shells[k], input.h, input.gravity, input.wind,
+                                                  y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr);
+        parts.push_back({&step.matrix, &step.rhs, offsets[k]});
+    }
+    std::vector<Mat6> mass;
+    std::vector<Vec6> twists;
+    freeTwist.resize(6, dynamicBodies.size());
+    for (const int b : dynamicBodies) {
+        freeTwist.col(mass.size()) = input.bodies[b].freeTwist;
+        mass.push_back(input.bodies[b].mass);
+        twists.push_back(input.bodies[b].freeTwist);
+    }
+    system.begin(std::move(parts), static_cast<int>(start.cols()), std::move(mass), std::move(twists));
+}
+
+/// A tenth of what gravity does in a step, so that a scene at rest is not solved to the last bit of nothing.
+double IslandSolver::Impl::floorOfReference(const IslandInput& input) const {
+    double sum = 0.0;
+    for (const Shell* shell : input.shells) sum += shell->masses().sum();
+    const double kick = 0.1 * input.h * std::max(input.gravity.norm(), 1e-6);
+    return sum * kick * kick;
+}
+
+void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& report) {
+    const ShellSettings& settings = input.shells[0]->settings();
+    double tolerance = settings.tolerance;
+    int maxIterations = settings.maxIterations;
+    for (const Shell* shell : input.shells) {
+        tolerance = std::min(tolerance, shell->settings().tolerance);
+        maxIterations = std::max(maxIterations, shell->settings().maxIterations);
+    }
+    Points guess = report.solves == 0 ? Points(start + lastChange) : v;
+    Eigen::Matrix<double, 6, Eigen::Dynamic> guessTwist = report.solves == 0 ? freeTwist : u.w;
+    u.resize(static_cast<int>(start.cols()), system.bodyCount());
+    const double floor = floorOfReference(input);
+    int freshIterations = -1, lastIterations = 0;  // of the first solve with the present factor, and of the last one
+    for (int round = 0;; ++round) {
+        response.writeTo(system);
+        if (freshIterations < 0 || lastIterations > 20 + 2 * freshIterations) {
+            preconditioner.build(system, settings.preconditioner);
+            freshIterations = -1;
+        } else {
+            preconditioner.updateBodies(system);
+        }
+        system.start(start, freeTwist, reference);  // dv = 0: what the tolerance is relative to
+        const double norm2 = std::max(pcg.residualNorm2(system, preconditioner, reference), floor);
+        system.start(guess, guessTwist, u);
+        const PcgReport solve = pcg.solve(system, preconditioner, norm2, tolerance, maxIterations, u);
+        lastIterations = solve.iterations;
+        if (freshIterations < 0) freshIterations = solve.iterations;
+        ++report.solves;
+        report.pcgIterations += solve.iterations;
+        report.residual = solve.residual;
+        report.converged = solve.converged;
+        if (!u.allFinite()) return;
+        CoupledVector& r = reference;  // its memory is free now
+        system.residual(u, r, unfiltered);
+        system.velocities(u, v);
+        if (!response.update(system, {v, u.w, unfiltered}, y, round)) break;
+        guess = v;
+        guessTwist = u.w;
+    }
+    report.deepestGap = response.deepestGap();
+    if (report.deepestGap < -20.0 * response.slop()) report.converged = false;
+}
+
+void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
+    response.finish(report.contacts);
+    for (std::size_t b = 0; b < input.bodies.size(); ++b) {
+        CoupledBody& body = input.bodies[b];
+        body.twist = body.prescribed ? body.freeTwist : Vec6(u.w.col(dynamicIndex[b]));
+        // The solved change of momentum, not the sum of the contacts' impulses: a light body would feel their residual.
+        body.impulse = body.prescribed ? Vec6::Zero() : Vec6(body.mass * (body.twist - body.freeTwist));
+    }
+    balance(input, report.contacts);
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        Shell& shell = *input.shells[k];
+        const int n = shell.vertexCount();
+        lastChange.middleCols(offsets[k], n) = v.middleCols(offsets[k], n) - shell.velocities();
+        shell.m_v = v.middleCols(offsets[k], n);
+        shell.m_y = y.middleCols(offsets[k], n);
+    }
+}
+
+/// Makes the ledger exact whatever the tolerance: what the contacts report, what the bodies got and what the shells'
+/// momentum changed by are the same to rounding. The residual that the solve left is spread over contacts and vertices.
+void IslandSolver::Impl::balance(const IslandInput& input, std::vector<ContactImpulse>& impulses) {
+    const auto count = input.bodies.size();
+    std::vector<Vec6> onBodies(count, Vec6::Zero());
+    std::vector<double> pressed(count, 0.0);
+    for (const auto& [contact, impulse, sticks] : impulses) {
+        onBodies[contact.body] -= pointImpulse(impulse, contactArm(input, contact));
+        pressed[contact.body] += impulse.norm();
+    }
+    std::vector<Vec3> onShells(input.shells.size(), Vec3::Zero());
+    for (const auto& anchor : input.anchors) {
+        const Vec3 impulse = -unfiltered.col(offsets[anchor.shell] + anchor.vertex);
+        onBodies[anchor.body] -= pointImpulse(impulse, anchor.point - input.bodies[anchor.body].position);
+        onShells[anchor.shell] += impulse;
+    }
+    for (std::size_t b = 0; b < count; ++b)
+        if (input.bodies[b].prescribed || !(pressed[b] > 0.0)) input.bodies[b].impulse = onBodies[b];
+    for (auto& [contact, impulse, sticks] : impulses) {
+        const Vec3 missing = input.bodies[contact.body].impulse.head<3>() - onBodies[contact.body].head<3>();
+        impulse -= missing * (impulse.norm() / pressed[contact.body]);
+        onShells[contact.shell] += impulse;
+    }
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        const Shell& shell = *input.shells[k];
+        if (shell.pinCount() > 0) continue;
+        auto vk = v.middleCols(offsets[k], shell.vertexCount());
+        Vec3 solved = -unfiltered.middleCols(offsets[k], shell.vertexCount()).rowwise().sum();
+        for (const auto& row : system.rows())
+            if (row.vertices[0] >= offsets[k] && row.vertices[0] < offsets[k] + shell.vertexCount())
+                solved += system.rowImpulse(row, v, u.w);
+        const double mass = shell.masses().sum() * (1.0 + input.h * shell.material().massDamping);
+        vk.colwise() += ((onShells[k] - solved) / mass).eval();
+    }
+}
+
+}  // namespace jacket

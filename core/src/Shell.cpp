@@ -1,0 +1,160 @@
+#include "jacket/Shell.h"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "ShellAssembly.h"
+#include "jacket/Island.h"
+
+namespace jacket {
+namespace {
+
+void requireSize(const Points& points, int count, const char* what) {
+    if (points.cols() != count)
+        throw std::invalid_argument(std::string(what) + " must have " + std::to_string(count) + " columns, got " +
+                                    std::to_string(points.cols()));
+    for (int i = 0; i < count; ++i)
+        if (!points.col(i).allFinite())
+            throw std::invalid_argument(std::string(what) + " must be finite, vertex " + std::to_string(i) + " is not");
+}
+
+void requireFinite(const Vec3& value, const char* what) {
+    if (!value.allFinite()) throw std::invalid_argument(std::string(what) + " must be finite");
+}
+
+}  // namespace
+
+Shell::Shell(const TriangleMesh& mesh, const ShellMaterial& material, const ShellSettings& settings)
+    : m_material(material), m_settings(settings), m_rest(mesh.positions), m_x(mesh.positions) {
+    requireUsable(mesh);
+    validate(material);
+    if (!(settings.tolerance > 0.0 && settings.tolerance < 1.0))
+        throw std::invalid_argument("ShellSettings.tolerance must be between 0 and 1, got " +
+                                    std::to_string(settings.tolerance));
+    if (settings.maxIterations < 1)
+        throw std::invalid_argument("ShellSettings.maxIterations must be >= 1, got " +
+                                    std::to_string(settings.maxIterations));
+    const int n = static_cast<int>(mesh.positions.cols());
+    m_mesh = std::make_unique<HalfEdgeMesh>(mesh.triangles, n);
+    m_v.setZero(3, n);
+    m_force.setZero(3, n);
+    m_y.setZero(3, n);
+    m_mass.setZero(n);
+    m_restArea.resize(m_mesh->triangleCount());
+    for (int t = 0; t < m_mesh->triangleCount(); ++t) {
+        const auto corners = mesh.triangles.col(t);
+        m_restArea[t] = triangleArea(m_rest.col(corners[0]), m_rest.col(corners[1]), m_rest.col(corners[2]));
+        for (int a = 0; a < 3; ++a) m_mass[corners[a]] += material.areaDensity() * m_restArea[t] / 3.0;
+    }
+    m_pinned.assign(n, 0);
+    m_pinTarget.assign(n, Vec3::Zero());
+    m_assembly = std::make_unique<ShellAssembly>(*this, m_rest);
+}
+
+Shell::~Shell() = default;
+Shell::Shell(Shell&&) noexcept = default;
+Shell& Shell::operator=(Shell&&) noexcept = default;
+
+void Shell::setPositions(const Points& x) {
+    requireSize(x, vertexCount(), "Shell positions");
+    m_x = x;
+    m_y.setZero();
+    for (int i = 0; i < vertexCount(); ++i)
+        if (m_pinned[i]) m_pinTarget[i] = m_x.col(i);
+}
+
+void Shell::setVelocities(const Points& v) {
+    requireSize(v, vertexCount(), "Shell velocities");
+    m_v = v;
+}
+
+void Shell::pin(int vertex) {
+    if (vertex < 0 || vertex >= vertexCount())
+        throw std::out_of_range("Shell::pin: vertex must be 0.." + std::to_string(vertexCount() - 1) + ", got " +
+                                std::to_string(vertex));
+    m_pinCount += m_pinned[vertex] ? 0 : 1;
+    m_pinned[vertex] = 1;
+    m_pinTarget[vertex] = m_x.col(vertex);
+}
+
+void Shell::movePin(int vertex, const Vec3& target) {
+    requireFinite(target, "Shell::movePin: target");
+    pin(vertex);
+    m_pinTarget[vertex] = target;
+}
+
+void Shell::unpin(int vertex) {
+    m_pinCount -= m_pinned.at(vertex) ? 1 : 0;
+    m_pinned[vertex] = 0;
+}
+
+void Shell::setForce(int vertex, const Vec3& force) {
+    requireFinite(force, "Shell::setForce: force");
+    if (vertex < 0 || vertex >= vertexCount())
+        throw std::out_of_range("Shell::setForce: vertex " + std::to_string(vertex));
+    m_force.col(vertex) = force;
+}
+
+ShellEnergy Shell::energy() const {
+    ShellEnergy e;
+    for (int i = 0; i < vertexCount(); ++i) e.kinetic += 0.5 * m_mass[i] * m_v.col(i).squaredNorm();
+    e.membrane = m_assembly->membrane().value(m_x);
+    e.bending = m_assembly->bending().value(m_x);
+    return e;
+}
+
+Vec3 Shell::linearMomentum() const {
+    return m_v * m_mass;
+}
+
+Vec3 Shell::angularMomentum(const Vec3& about) const {
+    Vec3 sum = Vec3::Zero();
+    for (int i = 0; i < vertexCount(); ++i) sum += m_mass[i] * (m_x.col(i) - about).cross(Vec3(m_v.col(i)));
+    return sum;
+}
+
+double Shell::maxStretch() const {
+    double most = 0.0;
+    for (const auto& e : m_mesh->edges())
+        most =
+            std::max(most, (m_x.col(e.v0) - m_x.col(e.v1)).norm() / (m_rest.col(e.v0) - m_rest.col(e.v1)).norm() - 1.0);
+    return most;
+}
+
+Points Shell::vertexNormals() const {
+    Points normals = Points::Zero(3, vertexCount());
+    for (int t = 0; t < m_mesh->triangleCount(); ++t) {
+        const auto c = m_mesh->triangles().col(t);
+        const Vec3 n = (m_x.col(c[1]) - m_x.col(c[0])).cross(m_x.col(c[2]) - m_x.col(c[0]));
+        for (int a = 0; a < 3; ++a) normals.col(c[a]) += n;
+    }
+    for (int i = 0; i < vertexCount(); ++i) {
+        const double length = normals.col(i).norm();
+        normals.col(i) = length > 0.0 ? Vec3(normals.col(i) / length) : Vec3::UnitY();
+    }
+    return normals;
+}
+
+Points Shell::elasticForces() const {
+    Points gradient = Points::Zero(3, vertexCount());
+    m_assembly->membrane().addGradient(m_x, gradient);
+    m_assembly->bending().addGradient(m_x, gradient);
+    return -gradient;
+}
+
+StepReport Shell::step(double h, const Vec3& gravity, const Wind* wind) {
+    if (!m_ownSolver) m_ownSolver = std::make_unique<IslandSolver>();
+    Shell* self = this;
+    IslandInput input{.h = h, .gravity = gravity, .wind = wind, .shells = {&self, 1}};
+    const StepReport report = m_ownSolver->solve(input);
+    if (report.finite) advance(h);
+    return report;
+}
+
+void Shell::advance(double h) {
+    m_x += h * m_v + m_y;
+    m_y.setZero();
+}
+
+}  // namespace jacket

@@ -1,0 +1,111 @@
+#pragma once
+#include <map>
+#include <set>
+#include <tuple>
+#include <vector>
+
+#include "jacket/Island.h"
+#include "solver/CoupledSystem.h"
+
+namespace jacket {
+
+/// Solved velocities of an island, and what was left over: (b - A v) of every vertex.
+struct IslandVelocities {
+    const Points& v;
+    const Eigen::Matrix<double, 6, Eigen::Dynamic>& w;  ///< dynamic bodies
+    const Points& unfiltered;
+};
+
+/// Decides what contacts do to vertices: which hold (active set), which slide or stick, which become filter entries of
+/// a vertex and which soft rows. One step is begin, then writeTo, solve, update until update returns false, then
+/// finish.
+///
+/// A vertex contact is an entry of the filter. A point inside an edge or triangle, a second body on the same vertex,
+/// and a body on a pinned vertex become soft rows, made exact by an augmented Lagrangian over the rounds.
+class ContactResponse {
+  public:
+    static constexpr int kMaxRounds = 16;  ///< usually 1 to 3; more while a body hits
+
+    /// Contacts at the start of the step, and the position alteration y of vertices that stand inside a body.
+    void begin(const IslandInput& input, const std::vector<int>& offsets, const std::vector<int>& dynamicIndex,
+               Points& y);
+    /// Turns held vertices and active contacts into constraints and rows.
+    void writeTo(CoupledSystem& system);
+    /// Reads a solve. True when the active set, a linearisation or friction changed so that another solve is needed.
+    bool update(const CoupledSystem& system, const IslandVelocities& solved, const Points& y, int round);
+    /// Most negative gap that the last update predicted for the end of the step and that it wanted closed [m].
+    double deepestGap() const { return m_deepestGap; }
+    /// Contacts that carried an impulse; remembers them for the next step.
+    void finish(std::vector<ContactImpulse>& impulses);
+    double slop() const { return m_vertexSlop; }
+
+  private:
+    /// A contact through the rounds of one step.
+    struct Touch {
+        Contact contact;
+        Vec3 arm{0, 0, 0}, carried{0, 0, 0};
+        int dynamicBody = -1;
+        double target = 0.0;      ///< least normal velocity relative to the body [m/s]
+        double allowedGap = 0.0;  ///< <= 0: what it stood inside at the start and need not leave at once [m]
+        bool active = false, sticks = false, isRow = false;
+        int patience = 0;                  ///< steps until it may be tried as sticking
+        double lambda = 0.0, kappa = 0.0;  ///< soft rows: multiplier [N s] and penalty [kg]
+        double drag = 0.0;                 ///< friction as damping [kg]
+        double offset = 0.0;               ///< how far it is kept off the surface for its chords' sake [m]
+        double lifted = 0.0;               ///< by how much that grew in this round [m]
+        double normalImpulse = 0.0;
+        Vec3 impulse{0, 0, 0};  ///< on the shell [N s]
+        int changes = 0;        ///< how often it was activated or dropped
+    };
+    using Key = std::tuple<const void*, const void*, int>;  ///< shell, body, feature
+    struct Memory {
+        double impulse, drag, offset;
+        bool sticks;
+        int patience;
+    };
+    /// The contacts that share one vertex's filter entry: up to three normals, against bodies of prescribed motion, or
+    /// one against a dynamic body.
+    struct VertexFilter {
+        int constraint;  ///< index in the system
+        int count = 0;
+        std::array<int, 3> touches{};
+    };
+
+    Key keyOf(const Contact& c) const;
+    Touch makeTouch(const Contact& contact) const;
+    void place(Touch& touch, const Contact& contact) const;
+    Vec3 relativeVelocity(const Touch& touch, const IslandVelocities& solved) const;
+    double timeOfTouch(const Touch& touch) const;
+    void keepEarliest();
+    void alter(Touch& touch, Points& y) const;
+    std::vector<VertexConstraint> holdConstraints() const;
+    bool joinFilter(int touch, std::vector<VertexConstraint>& constraints);
+    void finishFilter(const VertexFilter& filter, VertexConstraint& constraint) const;
+    SoftRow makeRow(Touch& touch, const CoupledSystem& system) const;
+    double vertexStiffness(const CoupledSystem& system, const Touch& touch) const;
+    void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);
+    bool releasePulling(int round);
+    bool updateFriction(const CoupledSystem& system, const IslandVelocities& solved);
+    bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
+    bool closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round);
+    bool liftVertices(const Contact& contact, double by);
+    int globalVertex(const Contact& c, int corner) const { return m_offsets[c.shell] + c.vertices[corner]; }
+
+    IslandInput m_input;
+    std::vector<int> m_offsets, m_dynamicIndex;
+    std::vector<Touch> m_touches;
+    std::map<Key, int> m_index;
+    std::map<Key, Memory> m_memory;
+    double m_memoryStep = 0.0;
+    std::vector<char> m_held;    ///< pinned or anchored
+    std::vector<double> m_edge;  ///< mean edge length of each shell [m]
+    std::vector<Points> m_end;
+    std::vector<Contact> m_found;
+    std::set<int> m_claimed;  ///< vertices of the soft rows that this round has added
+    double m_vertexSlop = 0.0, m_faceSlop = 0.0, m_deepestGap = 0.0;
+    int m_frictionRounds = 0;
+    std::vector<VertexFilter> m_filters;
+    std::vector<int> m_filterOf;  ///< per vertex, -1: none
+};
+
+}  // namespace jacket

@@ -1,0 +1,102 @@
+#include "solver/CoupledPreconditioner.h"
+
+#include <Eigen/LU>
+
+namespace jacket {
+
+void CoupledPreconditioner::build(const CoupledSystem& system, Preconditioner kind) {
+    m_kind = kind;
+    m_factors.resize(system.shells().size());
+    m_inverseBlocks.resize(system.shells().size());
+    for (std::size_t i = 0; i < system.shells().size(); ++i) buildShell(system, i, kind);
+    updateBodies(system);
+}
+
+void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind) {
+    const auto& part = system.shells()[shell];
+    m_diagonal = part.matrix->diagonal();
+    if (kind == Preconditioner::IncompleteCholesky)
+        m_lower = part.matrix->lower();
+    else
+        m_lower.clear();
+    addRows(system, part);
+    filterBlocks(system, part);
+    if (kind == Preconditioner::IncompleteCholesky) {
+        m_factors[shell].factor(*part.matrix, m_diagonal, m_lower);
+    } else {
+        m_inverseBlocks[shell].resize(m_diagonal.size());
+        for (std::size_t i = 0; i < m_diagonal.size(); ++i) m_inverseBlocks[shell][i] = m_diagonal[i].inverse();
+    }
+}
+
+void CoupledPreconditioner::addRows(const CoupledSystem& system, const CoupledSystem::ShellPart& part) {
+    const int end = part.offset + part.matrix->size();
+    for (const auto& row : system.rows()) {
+        if (row.vertices[0] < part.offset || row.vertices[0] >= end) continue;
+        for (int a = 0; a < 3; ++a) {
+            if (row.weights[a] == 0.0) continue;
+            const int i = row.vertices[a] - part.offset;
+            m_diagonal[i] += row.weights[a] * row.weights[a] * row.stiffness;
+            for (int b = 0; b < 3 && !m_lower.empty(); ++b) {
+                const int j = row.vertices[b] - part.offset;
+                if (j < i && row.weights[b] != 0.0)
+                    m_lower[part.matrix->slot(i, j)] += row.weights[a] * row.weights[b] * row.stiffness;
+            }
+        }
+    }
+}
+
+void CoupledPreconditioner::filterBlocks(const CoupledSystem& system, const CoupledSystem::ShellPart& part) {
+    const auto free = [&](int vertex) { return system.constraintOf(vertex + part.offset); };
+    for (int i = 0; i < part.matrix->size(); ++i) {
+        const VertexConstraint* ci = free(i);
+        if (ci) {
+            const double scale = m_diagonal[i].trace() / 3.0;
+            const Mat3 filtered = ci->free * (m_diagonal[i] + ci->damping) * ci->free;
+            m_diagonal[i] = filtered + scale * (Mat3::Identity() - ci->free);
+        }
+        if (m_lower.empty()) continue;
+        for (int k = part.matrix->rowBegin(i); k < part.matrix->rowEnd(i); ++k) {
+            const VertexConstraint* cj = free(part.matrix->column(k));
+            if (ci) m_lower[k] = (ci->free * m_lower[k]).eval();
+            if (cj) m_lower[k] = (m_lower[k] * cj->free).eval();
+        }
+    }
+}
+
+void CoupledPreconditioner::updateBodies(const CoupledSystem& system) {
+    std::vector<Mat6> blocks = system.mass();
+    for (const auto& part : system.shells()) {
+        for (int i = 0; i < part.matrix->size(); ++i) {
+            const VertexConstraint* ci = system.constraintOf(i + part.offset);
+            if (!ci || ci->body < 0) continue;
+            blocks[ci->body] += pointStiffness(part.matrix->diagonal()[i], ci->arm);
+            for (int k = part.matrix->rowBegin(i); k < part.matrix->rowEnd(i); ++k) {
+                const VertexConstraint* cj = system.constraintOf(part.matrix->column(k) + part.offset);
+                if (!cj || cj->body != ci->body) continue;
+                const Mat6 block = pointStiffness(part.matrix->lower()[k], ci->arm, cj->arm);
+                blocks[ci->body] += block + block.transpose();
+            }
+        }
+    }
+    for (const auto& row : system.rows())
+        if (row.body >= 0) blocks[row.body] += pointStiffness(row.stiffness, row.arm);
+    m_bodies.resize(blocks.size());
+    for (std::size_t b = 0; b < blocks.size(); ++b) m_bodies[b].compute(blocks[b]);
+}
+
+void CoupledPreconditioner::apply(const CoupledSystem& system, const CoupledVector& r, CoupledVector& z) const {
+    for (std::size_t i = 0; i < system.shells().size(); ++i) {
+        const auto& part = system.shells()[i];
+        if (m_kind == Preconditioner::IncompleteCholesky) {
+            m_factors[i].apply(r.s.data() + 3 * part.offset, z.s.data() + 3 * part.offset);
+        } else {
+            for (int k = 0; k < part.matrix->size(); ++k)
+                z.s.col(k + part.offset).noalias() = m_inverseBlocks[i][k] * r.s.col(k + part.offset);
+        }
+    }
+    for (std::size_t b = 0; b < m_bodies.size(); ++b) z.w.col(b) = m_bodies[b].solve(r.w.col(b));
+    system.filter(z);
+}
+
+}  // namespace jacket

@@ -1,0 +1,33 @@
+#pragma once
+#include <Eigen/Cholesky>
+#include <vector>
+
+#include "jacket/Shell.h"
+#include "solver/CoupledSystem.h"
+#include "solver/IncompleteCholesky.h"
+
+namespace jacket {
+
+/// P^-1 of an island: per shell 3x3 blocks or an incomplete factor of the filtered matrix, per body the 6x6 block
+/// M_b + sum_ij G_i^T A_ij G_j of the operator.
+class CoupledPreconditioner {
+  public:
+    void build(const CoupledSystem& system, Preconditioner kind);
+    /// Only the bodies' blocks, after the contacts of an otherwise unchanged system have changed: the shells' factor of
+    /// the old contacts, filtered by the new, is still positive definite, and cheaper than a new one.
+    void updateBodies(const CoupledSystem& system);
+    void apply(const CoupledSystem& system, const CoupledVector& r, CoupledVector& z) const;
+
+  private:
+    void buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind);
+    void addRows(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
+    void filterBlocks(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
+
+    std::vector<Mat3> m_diagonal, m_lower;  ///< scratch: filtered copy of one shell's matrix
+    std::vector<IncompleteCholesky> m_factors;
+    std::vector<std::vector<Mat3>> m_inverseBlocks;
+    std::vector<Eigen::LDLT<Mat6>> m_bodies;
+    Preconditioner m_kind = Preconditioner::BlockJacobi;
+};
+
+}  // namespace jacket

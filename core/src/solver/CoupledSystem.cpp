@@ -1,0 +1,131 @@
+#include "solver/CoupledSystem.h"
+
+#include <cassert>
+
+namespace jacket {
+
+void CoupledVector::resize(int vertices, int bodies) {
+    s.setZero(3, vertices);
+    w.setZero(6, bodies);
+}
+
+Mat6 pointStiffness(const Mat3& k, const Vec3& armI, const Vec3& armJ) {
+    const Mat3 ri = skew(armI), rj = skew(armJ);
+    Mat6 m;
+    m.topLeftCorner<3, 3>() = k;
+    m.topRightCorner<3, 3>() = -k * rj;
+    m.bottomLeftCorner<3, 3>() = ri * k;
+    m.bottomRightCorner<3, 3>() = -ri * k * rj;
+    return m;
+}
+
+Mat6 pointStiffness(const Mat3& k, const Vec3& arm) {
+    return pointStiffness(k, arm, arm);
+}
+
+void CoupledSystem::begin(std::vector<ShellPart> shells, int vertexCount, std::vector<Mat6> mass,
+                          std::vector<Vec6> freeTwist) {
+    m_shells = std::move(shells);
+    m_vertexCount = vertexCount;
+    m_mass = std::move(mass);
+    m_freeTwist = std::move(freeTwist);
+    m_v.resize(3, vertexCount);
+    m_q.resize(3, vertexCount);
+    m_constraintOf.assign(vertexCount, -1);
+    m_constraints.clear();
+    m_rows.clear();
+}
+
+void CoupledSystem::setContacts(std::vector<VertexConstraint> constraints, std::vector<SoftRow> rows) {
+    for (const auto& c : m_constraints) m_constraintOf[c.vertex] = -1;
+    m_constraints = std::move(constraints);
+    m_rows = std::move(rows);
+    for (std::size_t i = 0; i < m_constraints.size(); ++i) {
+        assert(m_constraintOf[m_constraints[i].vertex] < 0);
+        m_constraintOf[m_constraints[i].vertex] = static_cast<int>(i);
+    }
+}
+
+void CoupledSystem::start(const Points& v, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, CoupledVector& u) const {
+    u.s = v;
+    u.w = w;
+    for (const auto& c : m_constraints) {
+        Vec3 s = v.col(c.vertex) - c.carried;
+        if (c.body >= 0) s -= pointVelocity(w.col(c.body), c.arm);
+        u.s.col(c.vertex) = c.free * s + c.z;
+    }
+}
+
+void CoupledSystem::velocities(const CoupledVector& u, Points& v) const {
+    v = u.s;
+    for (const auto& c : m_constraints) {
+        v.col(c.vertex) += c.carried;
+        if (c.body >= 0) v.col(c.vertex) += pointVelocity(u.w.col(c.body), c.arm);
+    }
+}
+
+void CoupledSystem::multiply(const Points& v, Points& q) const {
+    for (const auto& shell : m_shells) shell.matrix->multiply(v.data() + 3 * shell.offset, q.data() + 3 * shell.offset);
+}
+
+Vec3 CoupledSystem::rowVelocity(const SoftRow& row, const Points& v,
+                                const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) const {
+    Vec3 u = -row.carried;
+    for (int a = 0; a < 3; ++a) u += row.weights[a] * v.col(row.vertices[a]);
+    if (row.body >= 0) u -= pointVelocity(w.col(row.body), row.arm);
+    return u;
+}
+
+Vec3 CoupledSystem::rowImpulse(const SoftRow& row, const Points& v,
+                               const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) const {
+    return row.load - row.stiffness * rowVelocity(row, v, w);
+}
+
+void CoupledSystem::apply(const CoupledVector& u, CoupledVector& q) const {
+    m_v = u.s;
+    for (const auto& c : m_constraints)
+        if (c.body >= 0) m_v.col(c.vertex) += pointVelocity(u.w.col(c.body), c.arm);
+    multiply(m_v, m_q);
+    for (int b = 0; b < bodyCount(); ++b) q.w.col(b) = m_mass[b] * u.w.col(b);
+    for (const auto& row : m_rows) {
+        Vec3 velocity = Vec3::Zero();
+        for (int a = 0; a < 3; ++a) velocity += row.weights[a] * m_v.col(row.vertices[a]);
+        if (row.body >= 0) velocity -= pointVelocity(u.w.col(row.body), row.arm);
+        const Vec3 f = row.stiffness * velocity;
+        for (int a = 0; a < 3; ++a) m_q.col(row.vertices[a]) += row.weights[a] * f;
+        if (row.body >= 0) q.w.col(row.body) -= pointImpulse(f, row.arm);
+    }
+    q.s = m_q;
+    for (const auto& c : m_constraints) {
+        const Vec3 f = m_q.col(c.vertex);
+        if (c.body >= 0) q.w.col(c.body) += pointImpulse(f, c.arm);
+        q.s.col(c.vertex) = c.free * (f + c.damping * u.s.col(c.vertex));
+    }
+}
+
+void CoupledSystem::residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered) const {
+    velocities(u, m_v);
+    multiply(m_v, m_q);
+    unfiltered.resize(3, m_vertexCount);
+    for (const auto& shell : m_shells)
+        unfiltered.middleCols(shell.offset, shell.rhs->cols()) =
+            *shell.rhs - m_q.middleCols(shell.offset, shell.rhs->cols());
+    for (int b = 0; b < bodyCount(); ++b) r.w.col(b) = m_mass[b] * (m_freeTwist[b] - u.w.col(b));
+    for (const auto& row : m_rows) {
+        const Vec3 f = rowImpulse(row, m_v, u.w);
+        for (int a = 0; a < 3; ++a) unfiltered.col(row.vertices[a]) += row.weights[a] * f;
+        if (row.body >= 0) r.w.col(row.body) -= pointImpulse(f, row.arm);
+    }
+    r.s = unfiltered;
+    for (const auto& c : m_constraints) {
+        const Vec3 f = unfiltered.col(c.vertex);
+        if (c.body >= 0) r.w.col(c.body) += pointImpulse(f, c.arm);
+        r.s.col(c.vertex) = c.free * (f - c.damping * u.s.col(c.vertex));
+    }
+}
+
+void CoupledSystem::filter(CoupledVector& u) const {
+    for (const auto& c : m_constraints) u.s.col(c.vertex) = (c.free * u.s.col(c.vertex)).eval();
+}
+
+}  // namespace jacket

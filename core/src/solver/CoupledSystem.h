@@ -1,0 +1,113 @@
+#pragma once
+#include <array>
+#include <span>
+#include <vector>
+
+#include "solver/BlockMatrix.h"
+
+namespace jacket {
+
+/// The unknowns of an island: a velocity per vertex, relative to its body where it is constrained, and a twist per
+/// body.
+struct CoupledVector {
+    Points s;                                    ///< 3 x vertices of all shells [m/s]
+    Eigen::Matrix<double, 6, Eigen::Dynamic> w;  ///< 6 x dynamic bodies
+
+    void resize(int vertices, int bodies);
+    double dot(const CoupledVector& o) const { return s.cwiseProduct(o.s).sum() + w.cwiseProduct(o.w).sum(); }
+    void addScaled(double a, const CoupledVector& o) { s += a * o.s, w += a * o.w; }
+    void scaleAndAdd(double a, const CoupledVector& o) { s = a * s + o.s, w = a * w + o.w; }
+    bool allFinite() const { return s.allFinite() && w.allFinite(); }
+};
+
+/// The modified filter of one vertex (Ascher & Boxerman 2003), relative to what it touches:
+/// v = s + G w_b + carried, S s free, (I - S) s = z.
+struct VertexConstraint {
+    int vertex;                   ///< in the island's numbering
+    int body = -1;                ///< dynamic body, or -1: the world, or a body of prescribed motion
+    Mat3 free = Mat3::Zero();     ///< S: projector on the free directions
+    Vec3 z = Vec3::Zero();        ///< prescribed part of s [m/s]
+    Vec3 arm = Vec3::Zero();      ///< vertex minus centre of mass [m]
+    Vec3 carried = Vec3::Zero();  ///< surface velocity of a prescribed body [m/s]
+    Mat3 damping = Mat3::Zero();  ///< friction as a damping of s [N s^2/m = kg]
+};
+
+/// An implicit soft row on the velocity u of a shell's point relative to a body: adds 1/2 u.(stiffness u) - load.u.
+struct SoftRow {
+    std::array<int, 3> vertices{};
+    Vec3 weights{1, 0, 0};
+    int body = -1;
+    Vec3 arm = Vec3::Zero();
+    Vec3 carried = Vec3::Zero();
+    Mat3 stiffness = Mat3::Zero();  ///< [kg]
+    Vec3 load = Vec3::Zero();       ///< [N s]
+};
+
+/// G = [1, -[arm]x]: velocity of a body's point from its twist.
+inline Vec3 pointVelocity(const Vec6& twist, const Vec3& arm) {
+    return twist.head<3>() + twist.tail<3>().cross(arm);
+}
+/// G^T f: impulse and angular impulse of an impulse at the point.
+inline Vec6 pointImpulse(const Vec3& impulse, const Vec3& arm) {
+    Vec6 result;
+    result << impulse, arm.cross(impulse);
+    return result;
+}
+/// G^T k G.
+Mat6 pointStiffness(const Mat3& k, const Vec3& arm);
+/// Gi^T k Gj.
+Mat6 pointStiffness(const Mat3& k, const Vec3& armI, const Vec3& armJ);
+
+/// The linear system of an island, symmetric positive definite in (s, w). Holds the constraints; borrows the matrices.
+class CoupledSystem {
+  public:
+    struct ShellPart {
+        const BlockMatrix* matrix;
+        const Points* rhs;
+        int offset;  ///< first vertex in the island's numbering
+    };
+
+    void begin(std::vector<ShellPart> shells, int vertexCount, std::vector<Mat6> mass, std::vector<Vec6> freeTwist);
+    /// Replaces all constraints and rows. At most one constraint per vertex.
+    void setContacts(std::vector<VertexConstraint> constraints, std::vector<SoftRow> rows);
+
+    std::span<const ShellPart> shells() const { return m_shells; }
+    std::span<const VertexConstraint> constraints() const { return m_constraints; }
+    std::span<const SoftRow> rows() const { return m_rows; }
+    const VertexConstraint* constraintOf(int vertex) const {
+        return m_constraintOf[vertex] < 0 ? nullptr : &m_constraints[m_constraintOf[vertex]];
+    }
+    int vertexCount() const { return m_vertexCount; }
+    int bodyCount() const { return static_cast<int>(m_mass.size()); }
+    const std::vector<Mat6>& mass() const { return m_mass; }
+    const std::vector<Vec6>& freeTwist() const { return m_freeTwist; }
+
+    /// u with (I - S) s = z, and s, w such that free vertices move with v and bodies with w.
+    void start(const Points& v, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, CoupledVector& u) const;
+    /// Absolute velocities of the vertices.
+    void velocities(const CoupledVector& u, Points& v) const;
+    /// q = filtered operator applied to u (homogeneous: nothing carried).
+    void apply(const CoupledVector& u, CoupledVector& q) const;
+    /// r = filtered right side minus operator at u. `unfiltered` receives (b - A v) of every vertex: minus the
+    /// reactions.
+    void residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered) const;
+    /// Zero in the constrained directions.
+    void filter(CoupledVector& u) const;
+    /// What a soft row does: its impulse on the shell at absolute velocities v.
+    Vec3 rowImpulse(const SoftRow& row, const Points& v, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) const;
+    /// Velocity of a row's point relative to its body.
+    Vec3 rowVelocity(const SoftRow& row, const Points& v, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) const;
+
+  private:
+    void multiply(const Points& v, Points& q) const;
+    std::vector<ShellPart> m_shells;
+    int m_vertexCount = 0;
+    std::vector<Mat6> m_mass;
+    std::vector<Vec6> m_freeTwist;
+    std::vector<VertexConstraint> m_constraints;
+    std::vector<SoftRow> m_rows;
+    std::vector<int> m_constraintOf;
+    mutable Points m_v, m_q;
+};
+
+}  // namespace jacket

@@ -1,0 +1,106 @@
+#pragma once
+#include <array>
+#include <vector>
+
+#include "jacket/models/StencilModel.h"
+#include "solver/BlockMatrix.h"
+
+namespace jacket {
+
+/// A and b of one shell's step, A v = b for the velocities v at its end (Baraff & Witkin 1998, eq. 16, with v = v_n +
+/// dv):
+///
+///     A = M (1 + h alpha) + (h^2 + h beta) K + h D
+///     b = M v_n + h D v_n + h (f + f_ext) - h K y
+///
+/// K = -df/dx (positive part), D = -df/dv, f the elastic force, alpha and beta the mass- and stiffness-proportional
+/// damping, y the position alteration. This class alone knows the powers of h and the signs.
+class StepSystem {
+  public:
+    BlockMatrix matrix;
+    Points rhs;
+
+    void begin(double h, double stiffnessDamping) {
+        m_h = h;
+        m_stiffnessFactor = h * h + h * stiffnessDamping;
+        matrix.setZero();
+        rhs.setZero(3, matrix.size());
+    }
+
+    /// One term of an energy. `slots`: see StencilSlots.
+    template <int N>
+    void add(const std::array<int, N>& vertices, const std::array<int, N*(N - 1) / 2>& slots,
+             const StencilEval<N>& term) {
+        for (int a = 0; a < N; ++a) rhs.col(vertices[a]) -= m_h * term.gradient.col(a);
+        addMatrix<N>(vertices, slots, term.hessian, m_stiffnessFactor);
+    }
+
+    /// A linear damping force -D v; its h D v_n on the right cancels the force itself.
+    template <int N>
+    void addDamping(const std::array<int, N>& vertices, const std::array<int, N*(N - 1) / 2>& slots,
+                    const Eigen::Matrix<double, 3 * N, 3 * N>& damping) {
+        addMatrix<N>(vertices, slots, damping, m_h);
+    }
+
+    /// The alteration's force -K y. Only after every energy and before anything else has been added.
+    void addAlteration(const Points& y) {
+        m_scratch.resize(3, matrix.size());
+        matrix.multiply(y.data(), m_scratch.data());  // (h^2 + h beta) K y
+        rhs -= (m_h / m_stiffnessFactor) * m_scratch;
+    }
+
+    /// A force on one vertex [N].
+    void addForce(int vertex, const Vec3& force) { rhs.col(vertex) += m_h * force; }
+
+    /// A force that depends on the velocities of a triangle's corners alike: `force` on each at v_n, `drag` =
+    /// -df_a/dv_b between any two of its corners.
+    void addDrag(const std::array<int, 3>& vertices, const std::array<int, 3>& slots, const Vec3& force,
+                 const Mat3& drag, const Points& v) {
+        const Vec3 sum = v.col(vertices[0]) + v.col(vertices[1]) + v.col(vertices[2]);
+        for (const int i : vertices) rhs.col(i) += m_h * (force + drag * sum);
+        for (const int i : vertices) matrix.diagonal()[i] += m_h * drag;
+        for (const int s : slots) matrix.lower()[s >= 0 ? s : ~s] += m_h * drag;  // symmetric
+    }
+
+    void addMass(const Eigen::VectorXd& mass, const Points& v, double massDamping) {
+        for (int i = 0; i < matrix.size(); ++i) {
+            matrix.diagonal()[i].diagonal().array() += mass[i] * (1.0 + m_h * massDamping);
+            rhs.col(i) += mass[i] * v.col(i);
+        }
+    }
+
+  private:
+    template <int N>
+    void addMatrix(const std::array<int, N>& vertices, const std::array<int, N*(N - 1) / 2>& slots,
+                   const Eigen::Matrix<double, 3 * N, 3 * N>& term, double factor) {
+        int pair = 0;
+        for (int a = 0; a < N; ++a) {
+            matrix.diagonal()[vertices[a]] += factor * term.template block<3, 3>(3 * a, 3 * a);
+            for (int b = 0; b < a; ++b, ++pair) {
+                const int s = slots[pair];
+                if (s >= 0)
+                    matrix.lower()[s] += factor * term.template block<3, 3>(3 * a, 3 * b);
+                else
+                    matrix.lower()[~s] += factor * term.template block<3, 3>(3 * b, 3 * a);
+            }
+        }
+    }
+
+    double m_h = 0.0, m_stiffnessFactor = 0.0;
+    Points m_scratch;
+};
+
+/// Where the blocks (a, b), b < a, of a stencil live in the matrix: the slot of lower block (v_a, v_b), or ~slot of
+/// (v_b, v_a) when v_b > v_a.
+template <int N>
+std::array<int, N*(N - 1) / 2> stencilSlots(const BlockMatrix& matrix, const std::array<int, N>& vertices) {
+    std::array<int, N*(N - 1) / 2> slots;
+    int pair = 0;
+    for (int a = 0; a < N; ++a)
+        for (int b = 0; b < a; ++b, ++pair)
+            slots[pair] = vertices[a] > vertices[b] ? matrix.slot(vertices[a], vertices[b])
+                                                    : ~matrix.slot(vertices[b], vertices[a]);
+    return slots;
+}
+
+}  // namespace jacket
