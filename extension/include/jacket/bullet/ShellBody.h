@@ -1,0 +1,88 @@
+#pragma once
+#include <LinearMath/btVector3.h>
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "jacket/Shell.h"
+
+class btRigidBody;
+
+namespace jacket::bullet {
+
+/// How a shell behaves in a Bullet world; the defaults are what most scenes want.
+struct ShellOptions {
+    MembraneModel membrane = StVenantKirchhoffMembrane{};
+    BendingModel bending = DihedralBending{};
+    double tolerance = 1e-3;         ///< of the linear solve, relative
+    int maxIterations = 1000;        ///< of one linear solve
+    double friction = 0.5;           ///< multiplied with the body's, as Bullet does [-]
+    int collisionGroup = 1;          ///< btBroadphaseProxy::DefaultFilter
+    int collisionMask = -1;          ///< btBroadphaseProxy::AllFilter
+    double contactThickness = -1.0;  ///< distance kept from surfaces [m]; < 0: half the shell's thickness
+    Preconditioner preconditioner = Preconditioner::IncompleteCholesky;
+};
+
+class ShellWorld;
+
+/// One shell of a ShellWorld. Vertices are in the order of the mesh given to ShellWorld::add.
+class ShellBody {
+  public:
+    ~ShellBody();
+    ShellBody(const ShellBody&) = delete;
+    ShellBody& operator=(const ShellBody&) = delete;
+
+    std::span<const btVector3> positions() const { return m_positions; }  ///< for drawing, as of the last substep [m]
+    std::span<const btVector3> normals() const;                           ///< unit, computed when asked for
+    btVector3 velocity(int vertex) const;                                 ///< [m/s]
+    const Indices<3>& triangles() const { return m_shell.mesh().triangles(); }
+    int vertexCount() const { return m_shell.vertexCount(); }
+
+    /// Holds a vertex in space; throws std::out_of_range.
+    void pin(int vertex);
+    void movePin(int vertex, const btVector3& target);
+    void unpin(int vertex);
+    /// Ties a vertex to a body at their present distance. The body may be removed at any time, which frees the vertex.
+    void anchor(int vertex, btRigidBody& body);
+
+    void setPositions(std::span<const btVector3> positions);
+    void setVelocity(const btVector3& velocity);  ///< of every vertex
+    void setName(std::string name) { m_name = std::move(name); }
+    const std::string& name() const { return m_name; }
+
+    Shell& shell() { return m_shell; }  ///< the solver's own, in double precision
+    const Shell& shell() const { return m_shell; }
+    const ShellOptions& options() const { return m_options; }
+    double contactThickness() const { return m_contactThickness; }
+    /// Contacts that carried an impulse in the last substep.
+    std::span<const ContactImpulse> contacts() const { return m_contacts; }
+    /// Linear momentum without the gravity of the coming substep, which Bullet's bodies have not received yet [N s].
+    btVector3 linearMomentum() const;
+
+  private:
+    friend class ShellWorld;
+    friend class IslandFinder;
+    ShellBody(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options);
+    struct Anchor {
+        int vertex;
+        btRigidBody* body;
+        btVector3 local;  ///< in the body's frame
+    };
+    Shell m_shell;
+    ShellOptions m_options;
+    double m_contactThickness;
+    std::string m_name;
+    std::vector<Anchor> m_anchors;
+    std::vector<ContactImpulse> m_contacts;
+    std::vector<btVector3> m_positions;
+    mutable std::vector<btVector3> m_normals;
+    void publish();                        ///< copies positions for drawing
+    bool m_hasVelocity = false;            ///< a solve has been done for the coming motion
+    Vec3 m_pendingGravity = Vec3::Zero();  ///< h g that the velocities hold and Bullet's bodies do not yet [m/s]
+    class Proxy;                           ///< what Bullet's broadphase and ray tests see
+    std::unique_ptr<Proxy> m_proxy;
+};
+
+}  // namespace jacket::bullet

@@ -1,0 +1,71 @@
+#pragma once
+#include <BulletDynamics/Dynamics/btActionInterface.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "jacket/bullet/ShellBody.h"
+#include "jacket/loadMesh.h"
+
+class btDynamicsWorld;
+
+/// Shells of Bullet worlds. Link jacket::bullet (Bullet's float library) or jacket::bullet_float64.
+namespace jacket::bullet {
+
+struct Island;
+
+/// What the last substep cost and did, over all shells.
+struct WorldReport {
+    int shells = 0, contacts = 0, pcgIterations = 0, solves = 0;
+    bool converged = true;
+    bool finite = true;        ///< false: a shell's step was rejected; it stood still
+    int rejectedSteps = 0;     ///< since the world was made
+    int unconvergedSteps = 0;  ///< since the world was made
+    double secondsContact = 0.0, secondsSolve = 0.0;
+};
+
+/// The shells of one Bullet world. Registers itself as an action of the world and leaves it when destroyed; destroy it
+/// before the world. Steps with world.stepSimulation; nothing else changes.
+class ShellWorld : public btActionInterface {
+  public:
+    explicit ShellWorld(btDynamicsWorld& world);
+    ~ShellWorld() override;
+    ShellWorld(const ShellWorld&) = delete;
+    ShellWorld& operator=(const ShellWorld&) = delete;
+
+    /// Throws std::invalid_argument when mesh, material or options cannot be used. The reference stays valid until
+    /// remove().
+    ShellBody& add(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options = {});
+    void remove(ShellBody& shell);
+    int size() const { return static_cast<int>(m_shells.size()); }
+    ShellBody& operator[](int i) { return *m_shells[i]; }
+    const ShellBody& operator[](int i) const { return *m_shells[i]; }
+
+    void setWind(const Wind& wind);
+    void clearWind();
+    const WorldReport& lastStep() const { return m_report; }
+    /// Things the user should know once, e.g. a shape that shells cannot touch. Kept until read.
+    std::vector<std::string> takeWarnings();
+
+    void updateAction(btCollisionWorld* world, btScalar h) override;
+    void debugDraw(btIDebugDraw* drawer) override;
+
+  private:
+    struct Impl;
+    void solveNewcomers(btCollisionWorld& world, double h);
+    void moveShells(btCollisionWorld& world, double h);
+    void solveIsland(Island& island, double h);
+    void accept(Island& island, const StepReport& report, const std::vector<CoupledBody>& coupled,
+                const Vec3& pendingGravity);
+    void carry(const ShellBody& shell, int vertex, const Island& island, int body,
+               const std::vector<CoupledBody>& coupled, const Vec3* anchor);
+    void react(btCollisionObject& object, const CoupledBody& coupled);
+    void updateBounds(ShellBody& shell, double h);
+    btDynamicsWorld& m_world;
+    std::vector<std::unique_ptr<ShellBody>> m_shells;
+    WorldReport m_report;
+    std::unique_ptr<Impl> m_impl;
+};
+
+}  // namespace jacket::bullet

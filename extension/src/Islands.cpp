@@ -1,0 +1,119 @@
+#include "Islands.h"
+
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "ShellProxy.h"
+
+namespace jacket::bullet {
+
+IslandFinder::IslandFinder(btCollisionWorld& world, Obstacles& obstacles, std::span<ShellBody* const> shells)
+    : m_world(world), m_obstacles(obstacles), m_shells(shells) {
+    collectPairs();
+    collectAnchors();
+    std::sort(m_neighbours.begin(), m_neighbours.end(), [](const Neighbour& a, const Neighbour& b) {
+        return a.object->getWorldArrayIndex() < b.object->getWorldArrayIndex();
+    });
+}
+
+IslandFinder::Neighbour& IslandFinder::neighbour(btCollisionObject& object) {
+    for (Neighbour& known : m_neighbours)
+        if (known.object == &object) return known;
+    return m_neighbours.emplace_back(Neighbour{&object, {}, {}});
+}
+
+void IslandFinder::collectPairs() {
+    btOverlappingPairCache& cache = *m_world.getBroadphase()->getOverlappingPairCache();
+    for (int i = 0; i < cache.getNumOverlappingPairs(); ++i) {
+        const btBroadphasePair& pair = cache.getOverlappingPairArrayPtr()[i];
+        auto* first = static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject);
+        auto* second = static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject);
+        notePair(first, second);
+        notePair(second, first);
+    }
+}
+
+void IslandFinder::notePair(const btCollisionObject* proxy, btCollisionObject* object) {
+    if (proxy->getInternalType() != btCollisionObject::CO_USER_TYPE) return;
+    if (!object->hasContactResponse()) return;  // a trigger, or another shell
+    for (std::size_t k = 0; k < m_shells.size(); ++k)
+        if (m_shells[k]->m_proxy.get() == proxy && m_shells[k]->m_proxy->mayTouch(*object))
+            neighbour(*object).near.push_back(static_cast<int>(k));
+}
+
+void IslandFinder::collectAnchors() {
+    for (std::size_t k = 0; k < m_shells.size(); ++k)
+        for (const auto& anchor : m_shells[k]->m_anchors)
+            neighbour(*anchor.body).anchored.push_back(static_cast<int>(k));
+}
+
+/// For every shell the first shell of its island: shells are joined by the dynamic bodies that both have near.
+std::vector<int> IslandFinder::leaders(const std::vector<Obstacle>& obstacles) const {
+    std::vector<int> leader(m_shells.size());
+    std::iota(leader.begin(), leader.end(), 0);
+    const auto find = [&](int k) {
+        while (leader[k] != k) k = leader[k];
+        return k;
+    };
+    for (std::size_t b = 0; b < obstacles.size(); ++b) {
+        if (obstacles[b].body.prescribed) continue;
+        std::vector<int> joined = m_neighbours[b].near;
+        joined.insert(joined.end(), m_neighbours[b].anchored.begin(), m_neighbours[b].anchored.end());
+        for (const int k : joined) {
+            const int a = find(k), c = find(joined.front());
+            leader[std::max(a, c)] = std::min(a, c);
+        }
+    }
+    for (std::size_t k = 0; k < leader.size(); ++k) leader[k] = find(static_cast<int>(k));
+    return leader;
+}
+
+std::vector<Island> IslandFinder::find(double h, bool prescribed) {
+    std::vector<Obstacle> obstacles;
+    for (const Neighbour& n : m_neighbours)
+        obstacles.push_back(m_obstacles.make(*n.object, h, *m_world.getDispatcher(), prescribed));
+    const std::vector<int> leader = leaders(obstacles);
+
+    std::vector<Island> islands;
+    std::vector<int> islandOf(m_shells.size()), indexInIsland(m_shells.size());
+    for (std::size_t k = 0; k < m_shells.size(); ++k) {
+        if (leader[k] == static_cast<int>(k)) {
+            islandOf[k] = static_cast<int>(islands.size());
+            islands.emplace_back();
+        }
+        islandOf[k] = islandOf[leader[k]];
+        indexInIsland[k] = static_cast<int>(islands[islandOf[k]].shells.size());
+        islands[islandOf[k]].shells.push_back(m_shells[k]);
+    }
+    for (std::size_t b = 0; b < obstacles.size(); ++b) {
+        for (std::size_t i = 0; i < islands.size(); ++i) {
+            Neighbour here{m_neighbours[b].object, {}, {}};
+            const auto inIsland = [&](int k) { return islandOf[k] == static_cast<int>(i); };
+            std::copy_if(m_neighbours[b].near.begin(), m_neighbours[b].near.end(), std::back_inserter(here.near),
+                         inIsland);
+            std::copy_if(m_neighbours[b].anchored.begin(), m_neighbours[b].anchored.end(),
+                         std::back_inserter(here.anchored), inIsland);
+            if (!here.near.empty() || !here.anchored.empty())
+                addObstacle(islands[i], obstacles[b], here, indexInIsland);
+        }
+    }
+    return islands;
+}
+
+void IslandFinder::addObstacle(Island& island, const Obstacle& obstacle, const Neighbour& neighbour,
+                               const std::vector<int>& indexInIsland) const {
+    const int body = static_cast<int>(island.obstacles.size());
+    island.obstacles.push_back(obstacle);
+    for (const int k : neighbour.near) island.pairs.emplace_back(indexInIsland[k], body);
+    std::vector<int> anchored = neighbour.anchored;
+    anchored.erase(std::unique(anchored.begin(), anchored.end()), anchored.end());
+    for (const int k : anchored)
+        for (const auto& anchor : m_shells[k]->m_anchors)
+            if (anchor.body == obstacle.object)
+                island.anchors.push_back(
+                    {indexInIsland[k], anchor.vertex, body, obstacle.start * fromBullet(anchor.local)});
+}
+
+}  // namespace jacket::bullet

@@ -1,0 +1,140 @@
+#include "Obstacles.h"
+
+#include <BulletCollision/CollisionShapes/btCompoundShape.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+
+#include "ConvexPieces.h"
+#include "jacket/Types.h"
+
+namespace jacket::bullet {
+namespace {
+
+// A direction in which Bullet does not let a body move takes part with this many times its mass.
+constexpr double kLocked = 1e8;
+// Along a rigid contact that bore load in the last solve, a body is this many times heavier than it is.
+constexpr double kSupport = 1e4;
+
+Vec6 twistOf(const btRigidBody& body) {
+    Vec6 twist;
+    twist << fromBullet(body.getLinearVelocity()), fromBullet(body.getAngularVelocity());
+    return twist;
+}
+
+Mat6 massOf(const btRigidBody& body) {
+    const double mass = 1.0 / double(body.getInvMass());
+    Mat6 result = Mat6::Zero();
+    for (int k = 0; k < 3; ++k) result(k, k) = body.getLinearFactor()[k] == btScalar(0) ? kLocked * mass : mass;
+    const Mat3 inverse = fromBullet(body.getInvInertiaTensorWorld());
+    btVector3 centre;
+    btScalar radius;
+    body.getCollisionShape()->getBoundingSphere(centre, radius);
+    const double floor = 1.0 / (kLocked * mass * std::max(double(radius * radius), 1e-12));
+    Mat3 allowed = inverse;
+    for (int k = 0; k < 3; ++k) {
+        if (body.getAngularFactor()[k] != btScalar(0)) continue;
+        allowed.row(k).setZero();
+        allowed.col(k).setZero();
+    }
+    result.bottomRightCorner<3, 3>() = (allowed + floor * Mat3::Identity()).inverse();
+    return result;
+}
+
+/// Velocity that the body will have after the coming step if nothing touches it: forces as they stand, gravity
+/// included.
+Vec6 freeTwistOf(const btRigidBody& body, double h) {
+    Vec6 twist = twistOf(body);
+    if (!body.isActive()) return twist;
+    twist.head<3>() += h * double(body.getInvMass()) * fromBullet(body.getTotalForce());
+    twist.tail<3>() += h * (fromBullet(body.getInvInertiaTensorWorld()) * fromBullet(body.getTotalTorque()));
+    return twist;
+}
+
+/// Rigid contacts that carried impulse in the last solve stay in this one as stiff rows, or a shell would press a
+/// supported box through the floor.
+void addSupports(btDispatcher& dispatcher, const btRigidBody& body, CoupledBody& coupled) {
+    Mat6 support = Mat6::Zero();
+    for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
+        const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(m);
+        const bool first = manifold.getBody0() == &body;
+        if (!first && manifold.getBody1() != &body) continue;
+        const auto* other = btRigidBody::upcast(first ? manifold.getBody1() : manifold.getBody0());
+        const double mass = coupled.mass.diagonal().head<3>().minCoeff();
+        const double weight =
+            other && other->getInvMass() > 0 && other->isActive() ? 1.0 / double(other->getInvMass()) : kSupport * mass;
+        for (int k = 0; k < manifold.getNumContacts(); ++k) {
+            const btManifoldPoint& point = manifold.getContactPoint(k);
+            if (!(point.m_appliedImpulse > btScalar(0))) continue;
+            const Vec3 n = fromBullet(point.m_normalWorldOnB);
+            const Vec3 at = fromBullet(first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
+            const Vec6 row = (Vec6() << n, (at - coupled.position).cross(n)).finished();
+            support += weight * row * row.transpose();
+        }
+    }
+    if (support.isZero(0.0)) return;
+    const Vec6 momentum = coupled.mass * coupled.freeTwist;
+    coupled.mass += support;
+    coupled.freeTwist = coupled.mass.ldlt().solve(momentum);
+}
+
+}  // namespace
+
+Frame moved(const Frame& start, const Vec6& twist, double time) {
+    Frame frame = start;
+    frame.translation() += time * twist.head<3>();
+    const double angle = twist.tail<3>().norm() * time;
+    if (angle != 0.0)
+        frame.linear() = Eigen::AngleAxisd(angle, twist.tail<3>().normalized()).toRotationMatrix() * start.linear();
+    return frame;
+}
+
+Obstacle Obstacles::make(btCollisionObject& object, double h, btDispatcher& dispatcher, bool allPrescribed) {
+    Obstacle obstacle{&object, &piecesOf(*object.getCollisionShape()), fromBullet(object.getWorldTransform()), {}};
+    CoupledBody& coupled = obstacle.body;
+    btVector3 centre;
+    btScalar radius;
+    object.getCollisionShape()->getBoundingSphere(centre, radius);
+    coupled.radius = std::min(double(radius + centre.length()), 1e6);
+    coupled.key = &object;
+    const btRigidBody* rigid = btRigidBody::upcast(&object);
+    if (!rigid || object.isStaticObject()) {
+        coupled.prescribed = true;
+    } else if (object.isKinematicObject() || !rigid->isActive() || rigid->getInvMass() == btScalar(0) ||
+               allPrescribed) {
+        coupled.prescribed = true;
+        coupled.freeTwist = twistOf(*rigid);
+        if (allPrescribed) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
+    } else {
+        coupled.position = obstacle.start.translation();
+        coupled.mass = massOf(*rigid);
+        coupled.freeTwist = freeTwistOf(*rigid, h);
+        addSupports(dispatcher, *rigid, coupled);
+    }
+    coupled.position = obstacle.start.translation();
+    return obstacle;
+}
+
+const ShapePieces& Obstacles::piecesOf(const btCollisionShape& shape) {
+    btVector3 lower, upper;
+    shape.getAabb(btTransform::getIdentity(), lower, upper);
+    const int children =
+        shape.isCompound() ? static_cast<const btCompoundShape&>(shape).getUpdateRevision() : shape.getShapeType();
+    const auto [entry, fresh] = m_shapes.try_emplace(&shape);
+    ShapePieces& known = entry->second;
+    if (!fresh && known.children == children && known.lower == lower && known.upper == upper) return known;
+    std::vector<std::string> unsupported;
+    known.pieces = makeConvexPieces(shape, unsupported);
+    known.lower = lower;
+    known.upper = upper;
+    known.children = children;
+    for (const std::string& name : unsupported) {
+        if (std::find(m_warnedNames.begin(), m_warnedNames.end(), name) != m_warnedNames.end()) continue;
+        m_warnedNames.push_back(name);
+        m_warnings.push_back("shells pass through shapes of type " + name + ": not supported yet");
+    }
+    return known;
+}
+
+}  // namespace jacket::bullet

@@ -1,0 +1,52 @@
+#pragma once
+#include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
+
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "Convert.h"
+#include "ConvexContact.h"
+#include "jacket/Contact.h"
+
+class btRigidBody;
+
+namespace jacket::bullet {
+
+/// The convex pieces of a collision shape, and what shows that the shape has changed under us.
+struct ShapePieces {
+    std::vector<std::unique_ptr<ConvexPiece>> pieces;
+    btVector3 lower, upper;  ///< Bullet's bounds at identity
+    int children = 0;
+};
+
+/// One collision object near a shell: its pieces, its pose at the start of the step and its part in the solve.
+struct Obstacle {
+    btCollisionObject* object;
+    const ShapePieces* shape;
+    Frame start;  ///< pose of the object at the start of the step; its origin is the centre of mass
+    CoupledBody body;
+};
+
+/// Makes obstacles of Bullet's collision objects; keeps the pieces of every shape it has met.
+class Obstacles {
+  public:
+    /// Static, kinematic and sleeping bodies become bodies of prescribed motion. With `allPrescribed` every body does,
+    /// and starts where it stood h ago: the motion that Bullet has already made.
+    Obstacle make(btCollisionObject& object, double h, btDispatcher& dispatcher, bool allPrescribed);
+    /// Shapes without any piece that shells can touch are reported here once, by Bullet's name of the shape.
+    std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }
+
+  private:
+    const ShapePieces& piecesOf(const btCollisionShape& shape);
+    std::unordered_map<const btCollisionShape*, ShapePieces> m_shapes;
+    std::vector<std::string> m_warnings;
+    std::vector<std::string> m_warnedNames;
+};
+
+/// Pose after moving with a twist for a time: rotation by the exponential of the angular velocity.
+Frame moved(const Frame& start, const Vec6& twist, double time);
+
+}  // namespace jacket::bullet

@@ -1,0 +1,85 @@
+#include "jacket/bullet/ShellBody.h"
+
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "Convert.h"
+#include "ShellProxy.h"
+
+namespace jacket::bullet {
+namespace {
+
+ShellSettings settingsOf(const ShellOptions& o) {
+    if (!(o.friction >= 0.0))
+        throw std::invalid_argument("ShellOptions.friction must be >= 0, got " + std::to_string(o.friction));
+    return {.membrane = o.membrane,
+            .bending = o.bending,
+            .preconditioner = o.preconditioner,
+            .tolerance = o.tolerance,
+            .maxIterations = o.maxIterations};
+}
+
+}  // namespace
+
+ShellBody::ShellBody(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options)
+    : m_shell(mesh, material, settingsOf(options)),
+      m_options(options),
+      m_contactThickness(options.contactThickness < 0.0 ? 0.5 * material.thickness : options.contactThickness),
+      m_positions(mesh.positions.cols()),
+      m_proxy(std::make_unique<Proxy>(*this)) {
+    publish();
+}
+
+ShellBody::~ShellBody() = default;
+
+void ShellBody::publish() {
+    for (int i = 0; i < vertexCount(); ++i) m_positions[i] = toBullet(Vec3(m_shell.positions().col(i)));
+}
+
+std::span<const btVector3> ShellBody::normals() const {
+    const Points normals = m_shell.vertexNormals();
+    m_normals.resize(m_positions.size());
+    for (int i = 0; i < vertexCount(); ++i) m_normals[i] = toBullet(Vec3(normals.col(i)));
+    return m_normals;
+}
+
+btVector3 ShellBody::velocity(int vertex) const {
+    return toBullet(Vec3(m_shell.velocities().col(vertex)));
+}
+
+void ShellBody::pin(int vertex) {
+    m_shell.pin(vertex);
+}
+void ShellBody::movePin(int vertex, const btVector3& target) {
+    m_shell.movePin(vertex, fromBullet(target));
+}
+void ShellBody::unpin(int vertex) {
+    m_shell.unpin(vertex);
+}
+
+void ShellBody::anchor(int vertex, btRigidBody& body) {
+    if (vertex < 0 || vertex >= vertexCount())
+        throw std::out_of_range("ShellBody::anchor: vertex must be 0.." + std::to_string(vertexCount() - 1) + ", got " +
+                                std::to_string(vertex));
+    m_anchors.push_back({vertex, &body, body.getWorldTransform().inverse() * m_positions[vertex]});
+}
+
+void ShellBody::setPositions(std::span<const btVector3> positions) {
+    Points x(3, positions.size());
+    for (std::size_t i = 0; i < positions.size(); ++i) x.col(i) = fromBullet(positions[i]);
+    m_shell.setPositions(x);
+    publish();
+}
+
+void ShellBody::setVelocity(const btVector3& velocity) {
+    m_shell.setVelocities(fromBullet(velocity).replicate(1, vertexCount()));
+    m_hasVelocity = false;
+}
+
+btVector3 ShellBody::linearMomentum() const {
+    return toBullet(Vec3(m_shell.linearMomentum() - m_pendingGravity * m_shell.masses().sum()));
+}
+
+}  // namespace jacket::bullet

@@ -1,0 +1,254 @@
+#include "jacket/bullet/ShellWorld.h"
+
+#include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
+#include <BulletDynamics/Dynamics/btDynamicsWorld.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <LinearMath/btIDebugDraw.h>
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <optional>
+#include <stdexcept>
+
+#include "Convert.h"
+#include "Islands.h"
+#include "ShellContacts.h"
+#include "ShellProxy.h"
+#include "jacket/Island.h"
+
+namespace jacket::bullet {
+namespace {
+
+constexpr double kTeleport =
+    50.0;  // a body that strays faster than this from what was solved has been teleported [m/s]
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+bool contains(const btCollisionWorld& world, const btCollisionObject* object) {
+    const auto& objects = world.getCollisionObjectArray();
+    for (int i = 0; i < objects.size(); ++i)
+        if (objects[i] == object) return true;
+    return false;
+}
+
+/// Fastest that any point of any moving object goes, roughly: how far bounds must reach ahead [m/s].
+double fastestObject(const btCollisionWorld& world) {
+    double speed = 0.0;
+    const auto& objects = world.getCollisionObjectArray();
+    for (int i = 0; i < objects.size(); ++i) {
+        const btRigidBody* body = btRigidBody::upcast(objects[i]);
+        if (!body || body->isStaticObject() || !body->isActive()) continue;
+        speed = std::max(speed, double(body->getLinearVelocity().length()));
+    }
+    return speed;
+}
+
+}  // namespace
+
+/// A vertex that moves with a body until the next step: what the solve assumed of the body, to be replaced by what
+/// Bullet did with it.
+struct CarriedVertex {
+    int shell, vertex;
+    const btCollisionObject* object;
+    Frame start;
+    Vec6 twist;
+    std::optional<Vec3> anchor;  ///< where the vertex is tied, in the body's frame
+};
+
+struct ShellWorld::Impl {
+    Obstacles obstacles;
+    std::map<const ShellBody*, IslandSolver> solvers;  ///< of each island, by its first shell
+    std::vector<CarriedVertex> carried;
+    Wind wind;
+    bool hasWind = false;
+};
+
+ShellWorld::ShellWorld(btDynamicsWorld& world) : m_world(world), m_impl(std::make_unique<Impl>()) {
+    m_world.addAction(this);
+}
+
+ShellWorld::~ShellWorld() {
+    for (const auto& shell : m_shells) m_world.removeCollisionObject(shell->m_proxy.get());
+    m_world.removeAction(this);
+}
+
+ShellBody& ShellWorld::add(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options) {
+    std::unique_ptr<ShellBody> shell(new ShellBody(mesh, material, options));
+    ShellBody& added = *shell;
+    updateBounds(added, 1.0 / 60.0);
+    m_shells.push_back(std::move(shell));
+    m_world.addCollisionObject(added.m_proxy.get(), options.collisionGroup, options.collisionMask);
+    m_report.shells = size();
+    return added;
+}
+
+void ShellWorld::remove(ShellBody& shell) {
+    const auto found = std::find_if(m_shells.begin(), m_shells.end(), [&](const auto& s) { return s.get() == &shell; });
+    if (found == m_shells.end()) throw std::invalid_argument("ShellWorld::remove: the shell is not in this world");
+    m_world.removeCollisionObject(shell.m_proxy.get());
+    m_impl->solvers.clear();  // they remember contacts by shell
+    m_impl->carried.clear();
+    m_shells.erase(found);
+    m_report.shells = size();
+}
+
+void ShellWorld::setWind(const Wind& wind) {
+    m_impl->wind = wind;
+    m_impl->hasWind = true;
+}
+
+void ShellWorld::clearWind() {
+    m_impl->hasWind = false;
+}
+
+std::vector<std::string> ShellWorld::takeWarnings() {
+    return m_impl->obstacles.takeWarnings();
+}
+
+/// Bullet has just moved the bodies by the velocities that the last solve, and its own contacts, gave them. Here the
+/// shells move along with the velocities of the same solve, so that shells and bodies are drawn at the same instant;
+/// then the next solve looks at this configuration, and its impulses enter Bullet's next solve.
+void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
+    if (m_shells.empty() || !(h > btScalar(0))) return;
+    WorldReport report{.shells = size()};
+    report.rejectedSteps = m_report.rejectedSteps;
+    report.unconvergedSteps = m_report.unconvergedSteps;
+    m_report = report;
+    solveNewcomers(*world, double(h));
+    moveShells(*world, double(h));
+    std::vector<ShellBody*> all;
+    for (const auto& shell : m_shells) all.push_back(shell.get());
+    for (Island& island : IslandFinder(*world, m_impl->obstacles, all).find(double(h), false))
+        solveIsland(island, double(h));
+    for (const auto& shell : m_shells) updateBounds(*shell, double(h));
+}
+
+/// Shells that were added, or given a velocity, since the last step have no solved velocity to move with: they get one
+/// for the motion that the bodies have already made.
+void ShellWorld::solveNewcomers(btCollisionWorld& world, double h) {
+    std::vector<ShellBody*> newcomers;
+    for (const auto& shell : m_shells)
+        if (!shell->m_hasVelocity) newcomers.push_back(shell.get());
+    if (newcomers.empty()) return;
+    for (Island& island : IslandFinder(world, m_impl->obstacles, newcomers).find(h, true)) solveIsland(island, h);
+}
+
+void ShellWorld::moveShells(btCollisionWorld& world, double h) {
+    for (const auto& shell : m_shells)
+        if (shell->m_hasVelocity) shell->m_shell.advance(h);
+    for (const CarriedVertex& c : m_impl->carried) {
+        if (!contains(world, c.object)) continue;
+        Shell& shell = m_shells[c.shell]->m_shell;
+        const Vec3 assumed = shell.positions().col(c.vertex);
+        const Vec3 local = c.anchor ? *c.anchor : moved(c.start, c.twist, h).inverse(Eigen::Isometry) * assumed;
+        const Vec3 by = fromBullet(c.object->getWorldTransform()) * local - assumed;
+        if (by.norm() < kTeleport * h && by.allFinite()) shell.displace(c.vertex, by);
+    }
+    m_impl->carried.clear();
+    for (const auto& shell : m_shells) {
+        auto& anchors = shell->m_anchors;  // a removed body lets go
+        std::erase_if(anchors, [&](const auto& a) { return !contains(world, a.body); });
+        shell->publish();
+    }
+}
+
+void ShellWorld::solveIsland(Island& island, double h) {
+    std::vector<const ShellBody*> bodies(island.shells.begin(), island.shells.end());
+    std::vector<Shell*> shells;
+    for (ShellBody* shell : island.shells) shells.push_back(&shell->m_shell);
+    std::vector<CoupledBody> coupled;
+    for (const Obstacle& obstacle : island.obstacles) coupled.push_back(obstacle.body);
+    ShellContacts contacts(bodies, island.obstacles, island.pairs);
+    const Vec3 gravity = fromBullet(m_world.getGravity());
+    IslandInput input;
+    input.h = h;
+    input.gravity = gravity;
+    input.wind = m_impl->hasWind ? &m_impl->wind : nullptr;
+    input.shells = shells;
+    input.bodies = coupled;
+    input.anchors = island.anchors;
+    input.contacts = island.pairs.empty() ? nullptr : &contacts;
+    const auto start = std::chrono::steady_clock::now();
+    const StepReport report = m_impl->solvers[island.shells.front()].solve(input);
+    m_report.secondsSolve += secondsSince(start);
+    accept(island, report, coupled, h * gravity);
+}
+
+void ShellWorld::accept(Island& island, const StepReport& report, const std::vector<CoupledBody>& coupled,
+                        const Vec3& pendingGravity) {
+    m_report.pcgIterations += report.pcgIterations;
+    m_report.solves += report.solves;
+    m_report.contacts += static_cast<int>(report.contacts.size());
+    m_report.converged = m_report.converged && report.converged;
+    m_report.finite = m_report.finite && report.finite;
+    m_report.unconvergedSteps += report.converged ? 0 : 1;
+    m_report.rejectedSteps += report.finite ? 0 : 1;
+    for (ShellBody* shell : island.shells) {
+        shell->m_contacts.clear();
+        shell->m_hasVelocity = report.finite;  // a rejected step: stands still, and is solved afresh
+        shell->m_pendingGravity = pendingGravity;
+    }
+    if (!report.finite) return;
+    for (const ContactImpulse& impulse : report.contacts) {
+        ShellBody& shell = *island.shells[impulse.contact.shell];
+        shell.m_contacts.push_back(impulse);
+        if (impulse.contact.isVertex())
+            carry(shell, impulse.contact.vertices[0], island, impulse.contact.body, coupled, nullptr);
+    }
+    for (const Anchor& anchor : island.anchors)
+        carry(*island.shells[anchor.shell], anchor.vertex, island, anchor.body, coupled, &anchor.point);
+    for (std::size_t b = 0; b < coupled.size(); ++b) react(*island.obstacles[b].object, coupled[b]);
+}
+
+void ShellWorld::carry(const ShellBody& shell, int vertex, const Island& island, int body,
+                       const std::vector<CoupledBody>& coupled, const Vec3* anchor) {
+    const Obstacle& obstacle = island.obstacles[body];
+    if (obstacle.object->isStaticObject() && !anchor) return;
+    std::optional<Vec3> local;
+    if (anchor) local = obstacle.start.inverse(Eigen::Isometry) * *anchor;
+    const auto index = std::find_if(m_shells.begin(), m_shells.end(), [&](const auto& s) { return s.get() == &shell; });
+    m_impl->carried.push_back({static_cast<int>(index - m_shells.begin()), vertex, obstacle.object, obstacle.start,
+                               coupled[body].twist, local});
+}
+
+void ShellWorld::react(btCollisionObject& object, const CoupledBody& coupled) {
+    btRigidBody* body = btRigidBody::upcast(&object);
+    if (!body || body->isStaticOrKinematicObject() || coupled.impulse.isZero(0.0)) return;
+    const double kick = double(body->getInvMass()) * coupled.impulse.head<3>().norm();
+    const double still = 0.02 * double(m_world.getGravity().length()) / 60.0;
+    if (kick > still) body->activate();  // a feather does not wake a sleeping crate
+    if (!body->isActive()) return;
+    body->applyCentralImpulse(toBullet(Vec3(coupled.impulse.head<3>())));
+    body->applyTorqueImpulse(toBullet(Vec3(coupled.impulse.tail<3>())));
+}
+
+void ShellWorld::updateBounds(ShellBody& shell, double h) {
+    const Points& x = shell.m_shell.positions();
+    const Points& v = shell.m_shell.velocities();
+    Vec3 lower = x.rowwise().minCoeff(), upper = x.rowwise().maxCoeff();
+    const double ahead = 2.0 * h * (fastestObject(m_world) + v.colwise().norm().maxCoeff()) +
+                         4.0 * h * h * double(m_world.getGravity().length()) + shell.contactThickness() + 1e-3;
+    lower.array() -= ahead;
+    upper.array() += ahead;
+    shell.m_proxy->shape().setBounds(toBullet(lower), toBullet(upper));
+}
+
+void ShellWorld::debugDraw(btIDebugDraw* drawer) {
+    if (!drawer) return;
+    const btVector3 wire(0.2, 0.4, 0.8), pin(0.9, 0.6, 0.1), contact(0.9, 0.1, 0.1);
+    for (const auto& shell : m_shells) {
+        const auto x = shell->positions();
+        for (const auto& e : shell->shell().mesh().edges()) drawer->drawLine(x[e.v0], x[e.v1], wire);
+        for (int i = 0; i < shell->vertexCount(); ++i)
+            if (shell->shell().isPinned(i)) drawer->drawSphere(x[i], btScalar(0.01), pin);
+        for (const ContactImpulse& c : shell->contacts()) {
+            const btVector3 at = toBullet(c.contact.point);
+            drawer->drawLine(at, at + btScalar(0.1) * toBullet(c.contact.normal), contact);
+        }
+    }
+}
+
+}  // namespace jacket::bullet
