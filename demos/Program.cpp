@@ -1,0 +1,58 @@
+#include <CLI/CLI.hpp>
+#include <iostream>
+
+#include "Commands.h"
+#include "Result.h"
+
+namespace jacket::demo {
+
+namespace {
+
+constexpr const char* kExamples =
+    "Examples:\n"
+    "  jacket list                                              what there is to run\n"
+    "  jacket run trampoline                                    a ball falls onto a sheet; prints what happened\n"
+    "  jacket run cloth_sphere --out out/cloth --png 4          the same kind of thing, with files and pictures\n"
+    "  jacket run drape --seconds 1 --dt 1/240 --set 'shells.0.mesh.grid.cells=[40,40]'\n"
+    "  jacket run my_scene.json --set shells.sheet.material.thickness=2e-3\n"
+    "  jacket check hood.obj                                    what is wrong with a mesh\n"
+    "  jacket material denim                                    what a preset means\n"
+    "\n"
+    "Exit codes: 0 ok, 2 bad input, 3 not converged, 4 not finite.";
+
+/// CLI11 wants its mistakes printed by itself; ours are one line.
+int reportUsage(const CLI::App& app, const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    std::cerr << "jacket: " << error.what()
+              << "\nRun \"jacket --help\" or \"jacket COMMAND --help\" for what can be given.\n";
+    return kBadInput;
+}
+
+}  // namespace
+
+int runProgram(int argc, const char* const* argv) {
+    int exitCode = kOk;
+    CLI::App app("jacket: thin shells in Bullet's worlds", "jacket");
+    app.set_version_flag("--version", "jacket " JACKET_VERSION " (Bullet " + World::bulletVersion() + ", " +
+                                          World::precision() + " precision)");
+    app.require_subcommand(1);
+    app.footer(kExamples);
+    try {
+        addListCommand(app, exitCode);
+        addRunCommand(app, exitCode);
+        addCheckCommand(app, exitCode);
+        addMaterialCommand(app, exitCode);
+        app.parse(argc, argv);
+        return exitCode;
+    } catch (const CLI::ParseError& error) {
+        return reportUsage(app, error);
+    } catch (const InputError& error) {
+        std::cerr << "jacket: " << error.what() << '\n';
+        return kBadInput;
+    } catch (const std::exception& error) {
+        std::cerr << "jacket: " << error.what() << '\n';
+        return kInternalError;
+    }
+}
+
+}  // namespace jacket::demo

@@ -1,0 +1,133 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "Json.h"
+#include "Shape.h"
+#include "jacket/Shell.h"
+#include "jacket/TriangleMesh.h"
+
+/// What a scene file says, after every check that needs nothing but the file. SI units, y up.
+namespace jacket::demo {
+
+struct MeshFile {
+    std::filesystem::path file;  ///< Wavefront OBJ
+};
+struct HemisphereMesh {
+    double radius;  ///< [m]
+    int rings;
+};
+struct TubeMesh {
+    double radius, height;  ///< [m]
+    Eigen::Vector2i cells;  ///< around, along
+};
+using MeshSource = std::variant<MeshFile, GridOptions, HemisphereMesh, TubeMesh>;
+
+struct Transform {
+    Vec3 position = Vec3::Zero();     ///< [m]
+    Vec3 rotationDeg = Vec3::Zero();  ///< about the fixed x, then y, then z axis [degrees]
+
+    Mat3 rotation() const;
+};
+
+/// Vertices of one shell, by number or by an axis-aligned box in world coordinates.
+struct Selection {
+    struct Bounds {
+        Vec3 min, max;  ///< [m]
+    };
+    std::variant<Bounds, std::vector<int>> what;
+    std::string label;  ///< where the scene file says so, for messages
+
+    /// Never empty: throws InputError when nothing is selected, or a vertex does not exist.
+    std::vector<int> vertices(const Points& positions) const;
+};
+
+struct Load {
+    Selection where;
+    Vec3 total;  ///< [N]
+};
+
+struct ShellDescription {
+    std::string name, label;
+    MeshSource mesh;
+    std::optional<MeshSource> initialShape;  ///< same triangles, deformed; without it the shell starts at rest
+    Transform transform;
+    std::string preset;  ///< name of the material preset, or ""
+    ShellMaterial material;
+    MembraneModel membrane;
+    BendingModel bending;
+    double friction = 0.5;         ///< [-]
+    double tolerance = 1e-3;       ///< of the linear solve, relative
+    int maxIterations = 1000;      ///< of one linear solve
+    double contactThickness = -1;  ///< [m]; < 0: half the thickness
+    std::vector<Selection> pins;
+    std::vector<Load> loads;
+    double pressure = 0.0;                ///< [Pa]
+    Vec3 initialVelocity = Vec3::Zero();  ///< [m/s]
+    double perturbation = 0.0;            ///< free vertices start up to this far away, at random [m]
+};
+
+/// Prescribed motion of a body, which then stands still.
+struct Kinematic {
+    Vec3 velocity;  ///< [m/s]
+    double until;   ///< [s]
+};
+
+struct BodyDescription {
+    std::string name, label;
+    Shape shape;
+    double mass = 0.0;  ///< 0: static, or kinematic [kg]
+    Transform transform;
+    Vec3 velocity = Vec3::Zero();         ///< [m/s]
+    Vec3 angularVelocity = Vec3::Zero();  ///< [rad/s]
+    double friction = 0.5;                ///< [-]
+    std::optional<Kinematic> kinematic;
+};
+
+struct ProbeDescription {
+    std::string name;
+    int shell = -1, body = -1;  ///< one of them
+    std::optional<Selection> where;
+    std::string quantity;
+};
+
+struct CameraDescription {
+    std::optional<Vec3> eye, target;  ///< chosen so that the whole motion is seen when not given [m]
+    double fovDegrees = 30.0;         ///< vertical
+};
+
+struct Scene {
+    std::string name, description;
+    double dt = 1.0 / 60.0;  ///< length of a frame [s]
+    int substeps = 1;        ///< steps of a frame
+    double seconds = 2.0;
+    std::uint64_t seed = 0;
+    Vec3 gravity{0, -9.81, 0};  ///< [m/s^2]
+    std::optional<Wind> wind;
+    std::vector<ShellDescription> shells;
+    std::vector<BodyDescription> bodies;
+    std::vector<ProbeDescription> probes;
+    CameraDescription camera;
+
+    int frames() const;  ///< fewest that cover `seconds`
+    bool usesSeed() const;
+};
+
+/// Where relative file names in a scene are looked for.
+struct SceneOrigin {
+    JsonSource source;
+    std::filesystem::path folder;
+};
+
+/// Checks and reads a whole scene; throws InputError naming file, path, value and rule.
+Scene readScene(const Json& document, const SceneOrigin& origin);
+
+/// The scene with every default written out and files absolute, so that readScene gives the same one again.
+Json toJson(const Scene& scene);
+
+}  // namespace jacket::demo

@@ -1,0 +1,401 @@
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "ModelNames.h"
+#include "Scene.h"
+
+namespace jacket::demo {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using Names = std::vector<std::string>;
+
+constexpr std::array kSceneKeys{"name",    "description", "dt",     "substeps", "seconds", "seed",  "mode",
+                                "gravity", "wind",        "shells", "bodies",   "probes",  "camera"};
+constexpr std::array kShellKeys{"name",
+                                "mesh",
+                                "initial_shape",
+                                "transform",
+                                "material",
+                                "membrane",
+                                "bending",
+                                "friction",
+                                "tolerance",
+                                "max_iterations",
+                                "pin",
+                                "clamp",
+                                "force",
+                                "pressure",
+                                "initial_velocity",
+                                "integrator",
+                                "contact_thickness",
+                                "perturbation",
+                                "self_collision"};
+constexpr std::array kBodyKeys{
+    "name", "shape", "mass", "position", "rotation_deg", "velocity", "angular_velocity", "friction", "kinematic"};
+constexpr std::array kProbeKeys{"name", "shell", "body", "box", "vertices", "quantity"};
+constexpr std::array kMaterialKeys{"preset",
+                                   "young",
+                                   "poisson",
+                                   "thickness",
+                                   "density",
+                                   "yield",
+                                   "hardening",
+                                   "stretch_stiffness",
+                                   "bending_stiffness",
+                                   "area_density",
+                                   "stiffness_damping",
+                                   "mass_damping"};
+
+/// Before anything else is said about an object: a misspelt key explains more than a missing one.
+void checkKeys(ObjectReader& in, std::span<const char* const> known) {
+    for (const char* key : known) in.find(key);
+    in.finish();
+}
+
+fs::path readFile(ObjectReader& in, std::string_view key, const fs::path& folder) {
+    const fs::path given = in.text(key);
+    const fs::path besideScene = folder / given;
+    std::error_code ignored;
+    for (const fs::path& file : {besideScene, given})
+        if (fs::is_regular_file(file, ignored)) return fs::weakly_canonical(file);
+    throw InputError(in.label(key) + ": there is no file " + besideScene.lexically_normal().string());
+}
+
+Eigen::Vector2i readCells(ObjectReader& in, std::string_view key, int low) {
+    const auto cells = in.numbers(key, 2, Range{.low = static_cast<double>(low), .high = 10000});
+    for (const double n : cells)
+        if (n != std::floor(n)) in.fail(key, "must be two whole numbers, got " + shortNumber(n));
+    return {static_cast<int>(cells[0]), static_cast<int>(cells[1])};
+}
+
+GridOptions readGrid(ObjectReader in) {
+    const auto size = in.numbers("size", 2, Range::positive("m"));
+    GridOptions grid{.size = {size[0], size[1]}, .cells = readCells(in, "cells", 1)};
+    const Names diagonals{"right", "alternating", "equilateral"}, planes{"xz", "xy", "yz"};
+    const std::string diagonal = in.choice("diagonals", diagonals, "right"), plane = in.choice("plane", planes, "xz");
+    grid.diagonals =
+        static_cast<GridDiagonals>(std::find(diagonals.begin(), diagonals.end(), diagonal) - diagonals.begin());
+    grid.plane = static_cast<GridPlane>(std::find(planes.begin(), planes.end(), plane) - planes.begin());
+    in.finish();
+    return grid;
+}
+
+HemisphereMesh readHemisphere(ObjectReader in) {
+    const HemisphereMesh mesh{.radius = in.number("radius", Range::positive("m")), .rings = in.integer("rings", 1)};
+    in.finish();
+    return mesh;
+}
+
+TubeMesh readTube(ObjectReader in) {
+    TubeMesh mesh{.radius = in.number("radius", Range::positive("m")),
+                  .height = in.number("height", Range::positive("m")),
+                  .cells = readCells(in, "cells", 1)};
+    if (mesh.cells.x() < 3)
+        in.fail("cells", "must have at least 3 cells around, got " + std::to_string(mesh.cells.x()));
+    in.finish();
+    return mesh;
+}
+
+MeshSource readMesh(ObjectReader in, const fs::path& folder) {
+    static const Names kinds{"file", "grid", "hemisphere", "cylinder"};
+    const std::string kind = in.oneOf(kinds);
+    in.finish();
+    if (kind == "file") return MeshFile{readFile(in, kind, folder)};
+    if (kind == "grid") return readGrid(in.object(kind));
+    if (kind == "hemisphere") return readHemisphere(in.object(kind));
+    return readTube(in.object(kind));
+}
+
+Transform readPose(ObjectReader& in) {
+    return {.position = in.vector("position", Vec3::Zero()), .rotationDeg = in.vector("rotation_deg", Vec3::Zero())};
+}
+
+Selection readSelection(ObjectReader& in) {
+    static const Names kinds{"box", "vertices"};
+    if (in.oneOf(kinds) == "vertices") return {in.indices("vertices"), in.label()};
+    const Json& box = in.require("box");
+    if (!box.is_array() || box.size() != 2) in.fail("box", "must be [[min x, y, z], [max x, y, z]]");
+    const Json corners{{"0", box[0]}, {"1", box[1]}};
+    ObjectReader reader(corners, in.path("box"), in.source());
+    const Selection::Bounds bounds{reader.vector("0"), reader.vector("1")};
+    if ((bounds.min.array() > bounds.max.array()).any()) in.fail("box", "must have its smaller corner first");
+    return {bounds, in.label()};
+}
+
+std::optional<double> readOverride(ObjectReader& in, std::string_view key, const Range& range,
+                                   std::optional<double> fallback) {
+    return in.has(key) ? in.optionalNumber(key, range) : fallback;
+}
+
+/// Fields on top of `material`. What nothing else determines must be given: `start` is a whole preset, or absent.
+ShellMaterial readMaterialFields(ObjectReader& in, const std::optional<ShellMaterial>& start) {
+    ShellMaterial material = start.value_or(ShellMaterial{});
+    const bool stiffnessKnown = start || (in.has("stretch_stiffness") && in.has("bending_stiffness"));
+    const bool massKnown = start || in.has("area_density");
+    const auto fallback = [](bool known, double value) { return known ? std::optional(value) : std::nullopt; };
+    material.young = in.number("young", Range::positive("Pa"), fallback(stiffnessKnown, material.young));
+    material.poisson = in.number("poisson", Range{.low = -1, .includesLow = false, .high = 0.5}, material.poisson);
+    material.thickness =
+        in.number("thickness", Range::positive("m"), fallback(stiffnessKnown && massKnown, material.thickness));
+    material.density = in.number("density", Range::positive("kg/m^3"), fallback(massKnown, material.density));
+    material.stretchStiffnessOverride =
+        readOverride(in, "stretch_stiffness", Range::positive("N/m"), material.stretchStiffnessOverride);
+    material.bendingStiffnessOverride =
+        readOverride(in, "bending_stiffness", Range::nonNegative("N m"), material.bendingStiffnessOverride);
+    material.areaDensityOverride =
+        readOverride(in, "area_density", Range::positive("kg/m^2"), material.areaDensityOverride);
+    material.stiffnessDamping = in.number("stiffness_damping", Range::nonNegative("s"), material.stiffnessDamping);
+    material.massDamping = in.number("mass_damping", Range::nonNegative("1/s"), material.massDamping);
+    in.notYet("yield", "plasticity");
+    in.notYet("hardening", "plasticity");
+    return material;
+}
+
+const materials::Preset& findPreset(const std::string& name, const std::string& label) {
+    Names names;
+    for (const auto& preset : materials::presets()) {
+        if (preset.name == name) return preset;
+        names.emplace_back(preset.name);
+    }
+    throw InputError(label + ": unknown material \"" + name + "\"" + suggestion(name, names));
+}
+
+void readMaterial(ObjectReader& in, ShellDescription& shell) {
+    const Json& value = in.require("material");
+    if (value.is_string()) {
+        shell.preset = value.get<std::string>();
+        const auto& preset = findPreset(shell.preset, in.label("material"));
+        shell.material = preset.make(preset.usualThickness);
+        return;
+    }
+    ObjectReader fields = in.object("material");
+    checkKeys(fields, kMaterialKeys);
+    shell.preset = fields.text("preset", "");
+    std::optional<ShellMaterial> start;
+    if (!shell.preset.empty()) {
+        const auto& preset = findPreset(shell.preset, fields.label("preset"));
+        start = preset.make(fields.number("thickness", Range::positive("m"), preset.usualThickness));
+    }
+    shell.material = readMaterialFields(fields, start);
+}
+
+template <class Variant>
+Variant readModel(ObjectReader& in, std::string_view key) {
+    const Json* value = in.find(key);
+    if (!value) return Variant{};
+    std::string name;
+    if (value->is_object()) {
+        ObjectReader model = in.object(key);
+        name = model.text("model");
+        Variant result = modelByName<Variant>(name, model.label("model"));
+        std::visit([&](auto& m) { readParameters(model, m); }, result);
+        model.finish();
+        return result;
+    }
+    return modelByName<Variant>(in.text(key), in.label(key));
+}
+
+void readNotYet(ObjectReader& in) {
+    const auto isEmptyList = [](const Json* value) { return value && value->is_array() && value->empty(); };
+    if (!isEmptyList(in.find("clamp"))) in.notYet("clamp", "clamping an edge with its tangent");
+    if (in.flag("self_collision", false)) in.notYet("self_collision", "self-collision");
+    static const Names now{"backward-euler"}, later{"newton", "bdf2"};
+    const Json* integrator = in.find("integrator");
+    if (integrator && std::find(later.begin(), later.end(), *integrator) != later.end())
+        in.notYet("integrator", "\"" + integrator->get<std::string>() + "\"");
+    in.choice("integrator", now, "backward-euler");
+}
+
+ShellDescription readShell(ObjectReader in, const fs::path& folder, std::size_t index) {
+    ShellDescription shell;
+    shell.name = in.text("name", "shell" + std::to_string(index));
+    shell.label = in.label();
+    checkKeys(in, kShellKeys);
+    shell.mesh = readMesh(in.object("mesh"), folder);
+    if (in.has("initial_shape")) shell.initialShape = readMesh(in.object("initial_shape"), folder);
+    if (in.has("transform")) {
+        ObjectReader transform = in.object("transform");
+        shell.transform = readPose(transform);
+        transform.finish();
+    }
+    readMaterial(in, shell);
+    shell.membrane = readModel<MembraneModel>(in, "membrane");
+    shell.bending = readModel<BendingModel>(in, "bending");
+    shell.friction = in.number("friction", Range::nonNegative(), shell.friction);
+    shell.tolerance = in.number("tolerance", Range{.low = 0, .includesLow = false, .high = 1}, shell.tolerance);
+    shell.maxIterations = in.integer("max_iterations", 1, shell.maxIterations);
+    shell.contactThickness = in.number("contact_thickness", Range::nonNegative("m"), shell.contactThickness);
+    in.forEach("pin", [&](ObjectReader pin) {
+        shell.pins.push_back(readSelection(pin));
+        pin.finish();
+    });
+    in.forEach("force", [&](ObjectReader force) {
+        shell.loads.push_back({readSelection(force), force.vector("total")});
+        force.finish();
+    });
+    shell.pressure = in.number("pressure", Range::any("Pa"), shell.pressure);
+    shell.initialVelocity = in.vector("initial_velocity", Vec3::Zero());
+    shell.perturbation = in.number("perturbation", Range::nonNegative("m"), shell.perturbation);
+    readNotYet(in);
+    return shell;
+}
+
+Plane readPlane(ObjectReader& in) {
+    const auto plane = in.numbers("plane", 4, Range::any());
+    const Vec3 normal(plane[0], plane[1], plane[2]);
+    if (!(normal.norm() > 0)) in.fail("plane", "[nx, ny, nz, d] must have a normal that is not zero");
+    return {normal.normalized(), plane[3] / normal.norm()};
+}
+
+Shape readShape(ObjectReader in, const fs::path& folder) {
+    static const Names kinds{"sphere", "box", "capsule", "cylinder", "cone", "plane", "hull"};
+    in.notYet("mesh", "a body that is a triangle mesh");
+    in.notYet("compound", "a compound body");
+    const std::string kind = in.oneOf(kinds);
+    in.finish();
+    if (kind == "sphere") return Sphere{in.number(kind, Range::positive("m"))};
+    if (kind == "plane") return readPlane(in);
+    if (kind == "hull") return Hull{readFile(in, kind, folder), nullptr};
+    const auto sizes = in.numbers(kind, kind == "box" ? 3 : 2, Range::positive("m"));
+    if (kind == "box") return Box{{sizes[0], sizes[1], sizes[2]}};
+    if (kind == "capsule") return Capsule{sizes[0], sizes[1]};
+    if (kind == "cylinder") return Cylinder{sizes[0], sizes[1]};
+    return Cone{sizes[0], sizes[1]};
+}
+
+/// Refuses what would silently do nothing.
+void checkBody(const ObjectReader& in, const BodyDescription& body) {
+    const bool moves = body.velocity.norm() > 0 || body.angularVelocity.norm() > 0;
+    if (body.kinematic && body.mass > 0)
+        in.fail("kinematic", "needs mass 0: nothing can push a body whose motion is given");
+    if (body.mass == 0 && moves)
+        in.fail("velocity", "needs a mass > 0, or \"kinematic\": a body of mass 0 stands still");
+    if (std::holds_alternative<Plane>(body.shape) && (body.mass > 0 || body.kinematic))
+        in.fail("shape", "is a plane, which must be static: mass 0 and not kinematic");
+}
+
+BodyDescription readBody(ObjectReader in, const fs::path& folder, std::size_t index) {
+    BodyDescription body;
+    body.name = in.text("name", "body" + std::to_string(index));
+    body.label = in.label();
+    checkKeys(in, kBodyKeys);
+    body.shape = readShape(in.object("shape"), folder);
+    body.mass = in.number("mass", Range::nonNegative("kg"), body.mass);
+    body.transform = readPose(in);
+    body.velocity = in.vector("velocity", Vec3::Zero());
+    body.angularVelocity = in.vector("angular_velocity", Vec3::Zero());
+    body.friction = in.number("friction", Range::nonNegative(), body.friction);
+    if (in.has("kinematic")) {
+        ObjectReader motion = in.object("kinematic");
+        body.kinematic = {motion.vector("velocity"), motion.number("until", Range::nonNegative("s"), 1e9)};
+        motion.finish();
+    }
+    checkBody(in, body);
+    return body;
+}
+
+template <class Things>
+int indexByName(ObjectReader& in, std::string_view key, const Things& things) {
+    Names names;
+    for (const auto& thing : things) names.push_back(thing.name);
+    const std::string name = in.choice(key, names, {});
+    return static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
+}
+
+ProbeDescription readProbe(ObjectReader in, const Scene& scene) {
+    static const Names targets{"shell", "body"}, ofBody{"position", "velocity"};
+    static const Names ofShell{"mean_position", "max_displacement", "reaction", "elastic_force"};
+    checkKeys(in, kProbeKeys);
+    ProbeDescription probe;
+    probe.name = in.text("name");
+    if (in.oneOf(targets) == "body") {
+        probe.body = indexByName(in, "body", scene.bodies);
+        probe.quantity = in.choice("quantity", ofBody, {});
+    } else {
+        probe.shell = indexByName(in, "shell", scene.shells);
+        if (in.has("box") || in.has("vertices")) probe.where = readSelection(in);
+        probe.quantity = in.choice("quantity", ofShell, {});
+    }
+    return probe;
+}
+
+std::optional<Wind> readWind(ObjectReader& in) {
+    const Json* value = in.find("wind");
+    if (!value) return std::nullopt;
+    if (!value->is_object()) return Wind{.velocity = in.vector("wind")};
+    ObjectReader air = in.object("wind");
+    Wind wind;
+    wind.velocity = air.vector("velocity");
+    wind.airDensity = air.number("air_density", Range::nonNegative("kg/m^3"), wind.airDensity);
+    wind.normalDrag = air.number("normal_drag", Range::nonNegative(), wind.normalDrag);
+    wind.tangentialDrag = air.number("tangential_drag", Range::nonNegative(), wind.tangentialDrag);
+    air.finish();
+    return wind;
+}
+
+CameraDescription readCamera(ObjectReader in) {
+    CameraDescription camera;
+    if (in.has("eye")) camera.eye = in.vector("eye");
+    if (in.has("target")) camera.target = in.vector("target");
+    camera.fovDegrees = in.number("fov_deg", Range{.unit = "degrees", .low = 1, .high = 150}, camera.fovDegrees);
+    in.finish();
+    if (camera.eye && camera.target && (*camera.eye - *camera.target).norm() < 1e-9)
+        in.fail("eye", "must not be where the target is");
+    return camera;
+}
+
+/// Numbers of the whole run.
+void readRun(ObjectReader& in, Scene& scene) {
+    scene.description = in.text("description", "");
+    scene.name = in.text("name", scene.name);
+    scene.dt = in.duration("dt", scene.dt);
+    scene.substeps = in.integer("substeps", 1, scene.substeps);
+    scene.seconds = in.duration("seconds", scene.seconds);
+    scene.seed = static_cast<std::uint64_t>(in.integer("seed", 0, 0));
+    scene.gravity = in.vector("gravity", scene.gravity);
+    scene.wind = readWind(in);
+    if (in.has("camera")) scene.camera = readCamera(in.object("camera"));
+    static const Names modes{"dynamic"};
+    if (const Json* mode = in.find("mode"); mode && *mode == "static") in.notYet("mode", "static equilibrium");
+    in.choice("mode", modes, "dynamic");
+    constexpr double kMostFrames = 1e8;
+    if (scene.seconds / scene.dt > kMostFrames)
+        in.fail("seconds", "[s] must be <= 1e8 frames of dt, got " + shortNumber(scene.seconds));
+}
+
+template <class Things>
+void requireDistinctNames(const Things& things, std::string_view what) {
+    for (std::size_t i = 0; i < things.size(); ++i)
+        for (std::size_t j = 0; j < i; ++j)
+            if (things[i].name == things[j].name)
+                throw InputError(things[i].label + ".name: two " + std::string(what) + " are called \"" +
+                                 things[i].name + "\"");
+}
+
+}  // namespace
+
+Scene readScene(const Json& document, const SceneOrigin& origin) {
+    ObjectReader in(document, "", origin.source);
+    Scene scene;
+    scene.name = fs::path(origin.source.file).stem().string();
+    checkKeys(in, kSceneKeys);
+    readRun(in, scene);
+    in.forEach("shells", [&](ObjectReader shell) {
+        scene.shells.push_back(readShell(std::move(shell), origin.folder, scene.shells.size()));
+    });
+    in.forEach("bodies", [&](ObjectReader body) {
+        scene.bodies.push_back(readBody(std::move(body), origin.folder, scene.bodies.size()));
+    });
+    if (scene.shells.empty()) throw InputError(in.label("shells") + " must have at least one shell");
+    requireDistinctNames(scene.shells, "shells");
+    requireDistinctNames(scene.bodies, "bodies");
+    in.forEach("probes", [&](ObjectReader probe) { scene.probes.push_back(readProbe(std::move(probe), scene)); });
+    return scene;
+}
+
+}  // namespace jacket::demo

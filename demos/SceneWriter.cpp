@@ -1,0 +1,138 @@
+#include <array>
+
+#include "ModelNames.h"
+#include "Scene.h"
+
+namespace jacket::demo {
+
+namespace {
+
+Json toJson(const GridOptions& grid) {
+    constexpr std::array kDiagonals{"right", "alternating", "equilateral"}, kPlanes{"xz", "xy", "yz"};
+    return {{"size", {grid.size.x(), grid.size.y()}},
+            {"cells", {grid.cells.x(), grid.cells.y()}},
+            {"diagonals", kDiagonals[static_cast<std::size_t>(grid.diagonals)]},
+            {"plane", kPlanes[static_cast<std::size_t>(grid.plane)]}};
+}
+
+struct MeshToJson {
+    Json operator()(const MeshFile& mesh) const { return {{"file", mesh.file.string()}}; }
+    Json operator()(const GridOptions& grid) const { return {{"grid", toJson(grid)}}; }
+    Json operator()(const HemisphereMesh& mesh) const {
+        return {{"hemisphere", {{"radius", mesh.radius}, {"rings", mesh.rings}}}};
+    }
+    Json operator()(const TubeMesh& mesh) const {
+        return {{"cylinder",
+                 {{"radius", mesh.radius}, {"height", mesh.height}, {"cells", {mesh.cells.x(), mesh.cells.y()}}}}};
+    }
+};
+
+struct ShapeToJson {
+    Json operator()(const Sphere& s) const { return {{"sphere", s.radius}}; }
+    Json operator()(const Box& s) const { return {{"box", demo::toJson(s.size)}}; }
+    Json operator()(const Capsule& s) const { return {{"capsule", {s.radius, s.height}}}; }
+    Json operator()(const Cylinder& s) const { return {{"cylinder", {s.radius, s.height}}}; }
+    Json operator()(const Cone& s) const { return {{"cone", {s.radius, s.height}}}; }
+    Json operator()(const Plane& s) const { return {{"plane", {s.normal.x(), s.normal.y(), s.normal.z(), s.offset}}}; }
+    Json operator()(const Hull& s) const { return {{"hull", s.file.string()}}; }
+};
+
+Json toJson(const Selection& selection) {
+    if (const auto* vertices = std::get_if<std::vector<int>>(&selection.what)) return {{"vertices", *vertices}};
+    const auto& box = std::get<Selection::Bounds>(selection.what);
+    return {{"box", Json::array({demo::toJson(box.min), demo::toJson(box.max)})}};
+}
+
+Json toJson(const ShellMaterial& material) {
+    Json json{{"young", material.young},
+              {"poisson", material.poisson},
+              {"thickness", material.thickness},
+              {"density", material.density}};
+    if (material.stretchStiffnessOverride) json["stretch_stiffness"] = *material.stretchStiffnessOverride;
+    if (material.bendingStiffnessOverride) json["bending_stiffness"] = *material.bendingStiffnessOverride;
+    if (material.areaDensityOverride) json["area_density"] = *material.areaDensityOverride;
+    json["stiffness_damping"] = material.stiffnessDamping;
+    json["mass_damping"] = material.massDamping;
+    return json;
+}
+
+Json toJson(const Transform& pose) {
+    return {{"position", demo::toJson(pose.position)}, {"rotation_deg", demo::toJson(pose.rotationDeg)}};
+}
+
+Json toJson(const ShellDescription& shell) {
+    Json json{{"name", shell.name}, {"mesh", std::visit(MeshToJson{}, shell.mesh)}};
+    if (shell.initialShape) json["initial_shape"] = std::visit(MeshToJson{}, *shell.initialShape);
+    json["transform"] = toJson(shell.transform);
+    json["material"] = toJson(shell.material);
+    json["membrane"] = modelToJson(shell.membrane);
+    json["bending"] = modelToJson(shell.bending);
+    json["integrator"] = "backward-euler";
+    json["friction"] = shell.friction;
+    json["tolerance"] = shell.tolerance;
+    json["max_iterations"] = shell.maxIterations;
+    if (shell.contactThickness >= 0) json["contact_thickness"] = shell.contactThickness;
+    json["self_collision"] = false;
+    json["pin"] = Json::array();
+    for (const Selection& pin : shell.pins) json["pin"].push_back(toJson(pin));
+    json["force"] = Json::array();
+    for (const Load& load : shell.loads) {
+        json["force"].push_back(toJson(load.where));
+        json["force"].back()["total"] = demo::toJson(load.total);
+    }
+    json["pressure"] = shell.pressure;
+    json["initial_velocity"] = demo::toJson(shell.initialVelocity);
+    json["perturbation"] = shell.perturbation;
+    return json;
+}
+
+Json toJson(const BodyDescription& body) {
+    Json json{{"name", body.name}, {"shape", std::visit(ShapeToJson{}, body.shape)}, {"mass", body.mass}};
+    json.update(toJson(body.transform));
+    json["velocity"] = demo::toJson(body.velocity);
+    json["angular_velocity"] = demo::toJson(body.angularVelocity);
+    json["friction"] = body.friction;
+    if (body.kinematic)
+        json["kinematic"] = {{"velocity", demo::toJson(body.kinematic->velocity)}, {"until", body.kinematic->until}};
+    return json;
+}
+
+Json toJson(const ProbeDescription& probe, const Scene& scene) {
+    Json json{{"name", probe.name}};
+    if (probe.body >= 0) json["body"] = scene.bodies[probe.body].name;
+    if (probe.shell >= 0) json["shell"] = scene.shells[probe.shell].name;
+    if (probe.where) json.update(toJson(*probe.where));
+    json["quantity"] = probe.quantity;
+    return json;
+}
+
+Json toJson(const Wind& wind) {
+    return {{"velocity", demo::toJson(wind.velocity)},
+            {"air_density", wind.airDensity},
+            {"normal_drag", wind.normalDrag},
+            {"tangential_drag", wind.tangentialDrag}};
+}
+
+Json toJson(const CameraDescription& camera) {
+    Json json{{"fov_deg", camera.fovDegrees}};
+    if (camera.eye) json["eye"] = demo::toJson(*camera.eye);
+    if (camera.target) json["target"] = demo::toJson(*camera.target);
+    return json;
+}
+
+}  // namespace
+
+Json toJson(const Scene& scene) {
+    Json json{{"name", scene.name}, {"description", scene.description}, {"mode", "dynamic"},
+              {"dt", scene.dt},     {"substeps", scene.substeps},       {"seconds", scene.seconds},
+              {"seed", scene.seed}, {"gravity", toJson(scene.gravity)}};
+    if (scene.wind) json["wind"] = toJson(*scene.wind);
+    json["shells"] = json["bodies"] = json["probes"] = Json::array();
+    for (const auto& shell : scene.shells) json["shells"].push_back(toJson(shell));
+    for (const auto& body : scene.bodies) json["bodies"].push_back(toJson(body));
+    for (const auto& probe : scene.probes) json["probes"].push_back(toJson(probe, scene));
+    json["camera"] = toJson(scene.camera);
+    return json;
+}
+
+}  // namespace jacket::demo

@@ -1,0 +1,287 @@
+#include "World.h"
+
+#include <btBulletDynamicsCommon.h>
+
+#include <chrono>
+#include <type_traits>
+
+#include "Loads.h"
+#include "Meshes.h"
+#include "jacket/bullet/ShellWorld.h"
+
+namespace jacket::demo {
+
+namespace {
+
+btVector3 toBullet(const Vec3& v) {
+    return {btScalar(v.x()), btScalar(v.y()), btScalar(v.z())};
+}
+Vec3 fromBullet(const btVector3& v) {
+    return {v.x(), v.y(), v.z()};
+}
+
+btMatrix3x3 toBullet(const Mat3& m) {
+    return {btScalar(m(0, 0)), btScalar(m(0, 1)), btScalar(m(0, 2)), btScalar(m(1, 0)), btScalar(m(1, 1)),
+            btScalar(m(1, 2)), btScalar(m(2, 0)), btScalar(m(2, 1)), btScalar(m(2, 2))};
+}
+
+Mat3 fromBullet(const btMatrix3x3& m) {
+    Mat3 result;
+    for (int i = 0; i < 3; ++i) result.row(i) = fromBullet(m[i]).transpose();
+    return result;
+}
+
+/// Bullet's rounding of edges between bodies, kept small beside the shape: it would show as a gap.
+btScalar smallMargin(double size) {
+    return btScalar(0.002 * size);
+}
+
+struct MakeCollisionShape {
+    using Pointer = std::unique_ptr<btCollisionShape>;
+    Pointer operator()(const Sphere& s) const { return std::make_unique<btSphereShape>(btScalar(s.radius)); }
+    Pointer operator()(const Box& s) const { return std::make_unique<btBoxShape>(toBullet(Vec3(0.5 * s.size))); }
+    Pointer operator()(const Capsule& s) const {
+        return std::make_unique<btCapsuleShape>(btScalar(s.radius), btScalar(s.height));
+    }
+    Pointer operator()(const Cylinder& s) const {
+        return std::make_unique<btCylinderShape>(toBullet(Vec3(s.radius, 0.5 * s.height, s.radius)));
+    }
+    Pointer operator()(const Cone& s) const {
+        auto shape = std::make_unique<btConeShape>(btScalar(s.radius), btScalar(s.height));
+        shape->setMargin(smallMargin(std::min(s.radius, s.height)));
+        return shape;
+    }
+    Pointer operator()(const Plane& s) const {
+        return std::make_unique<btStaticPlaneShape>(toBullet(s.normal), btScalar(s.offset));
+    }
+    Pointer operator()(const Hull& s) const {
+        auto shape = std::make_unique<btConvexHullShape>();
+        const Points& vertices = s.geometry->vertices();
+        for (int i = 0; i < vertices.cols(); ++i)
+            shape->addPoint(toBullet(Vec3(vertices.col(i) - s.geometry->centroid())), false);
+        shape->recalcLocalAabb();
+        shape->setMargin(smallMargin(std::cbrt(s.geometry->volume())));
+        return shape;
+    }
+};
+
+}  // namespace
+
+struct World::Impl {
+    /// A body leaves the world before it ends, also when a later part of the scene turns out to be wrong.
+    struct RemoveBody {
+        btDynamicsWorld* world;
+        void operator()(btRigidBody* body) const {
+            world->removeRigidBody(body);
+            delete body;
+        }
+    };
+    /// A body and what it needs to live.
+    struct Body {
+        const BodyDescription* description = nullptr;
+        std::unique_ptr<btCollisionShape> shape;
+        std::unique_ptr<btRigidBody, RemoveBody> body{nullptr, RemoveBody{nullptr}};
+        Vec3 centre =
+            Vec3::Zero();  ///< centre of mass in the shape's frame: Bullet's bodies are described from there [m]
+        btVector3 inertia{0, 0, 0};
+    };
+
+    explicit Impl(const Scene& s) : scene(s) {
+        world.setGravity(toBullet(scene.gravity));
+        for (BodyDescription& body : scene.bodies) addBody(body);
+        for (std::size_t k = 0; k < scene.shells.size(); ++k) addShell(scene.shells[k], scene.seed + k);
+        for (const ProbeDescription& probe : scene.probes)
+            if (probe.where) probe.where->vertices(starts[probe.shell]);  // throws now rather than after the run
+        if (scene.wind) shells.setWind(*scene.wind);
+    }
+
+    void addBody(BodyDescription& description) {
+        Body entry;
+        entry.description = &description;
+        if (auto* hull = std::get_if<Hull>(&description.shape)) {
+            hull->geometry = loadHull(hull->file, description.label);
+            entry.centre = hull->geometry->centroid();
+        }
+        entry.shape = std::visit(MakeCollisionShape{}, description.shape);
+        const auto mass = btScalar(description.mass);
+        if (mass > 0) entry.shape->calculateLocalInertia(mass, entry.inertia);
+        btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, entry.shape.get(), entry.inertia);
+        info.m_friction = btScalar(description.friction);
+        const Mat3 rotation = description.transform.rotation();
+        const Vec3 centre = description.transform.position + rotation * entry.centre;
+        info.m_startWorldTransform = btTransform(toBullet(rotation), toBullet(centre));
+        entry.body = decltype(entry.body)(new btRigidBody(info), RemoveBody{&world});
+        entry.body->setActivationState(DISABLE_DEACTIVATION);  // Bullet puts bodies to sleep that still swing slowly
+        entry.body->setLinearVelocity(toBullet(description.velocity));
+        entry.body->setAngularVelocity(toBullet(description.angularVelocity));
+        if (description.kinematic)
+            entry.body->setCollisionFlags(entry.body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+        world.addRigidBody(entry.body.get());
+        bodies.push_back(std::move(entry));
+    }
+
+    void addShell(const ShellDescription& description, std::uint64_t seed) {
+        const TriangleMesh mesh = makeMesh(description.mesh, description.label + ".mesh");
+        bullet::ShellOptions options;
+        options.membrane = description.membrane;
+        options.bending = description.bending;
+        options.tolerance = description.tolerance;
+        options.maxIterations = description.maxIterations;
+        options.friction = description.friction;
+        options.contactThickness = description.contactThickness;
+        bullet::ShellBody* shell = nullptr;
+        try {
+            shell = &shells.add(mesh, description.material, options);
+        } catch (const std::invalid_argument& error) {
+            throw InputError(description.label + ": " + error.what());
+        }
+        shell->setName(description.name);
+        place(*shell, description, startPositions(description, mesh), seed);
+        applyLoads(shell->shell(), description);
+    }
+
+    void place(bullet::ShellBody& shell, const ShellDescription& description, Points x, std::uint64_t seed) {
+        std::vector<char> isPinned(x.cols(), 0);
+        for (const Selection& pin : description.pins)
+            for (const int vertex : pin.vertices(x)) isPinned[vertex] = 1;
+        starts.push_back(x);
+        if (description.perturbation > 0) perturb(x, description.perturbation, isPinned, seed);
+        std::vector<btVector3> positions;
+        for (int i = 0; i < x.cols(); ++i) positions.push_back(toBullet(Vec3(x.col(i))));
+        shell.setPositions(positions);
+        shell.setVelocity(toBullet(description.initialVelocity));
+        for (int i = 0; i < x.cols(); ++i)
+            if (isPinned[i]) shell.pin(i);
+    }
+
+    void applyLoads(Shell& shell, const ShellDescription& description) {
+        for (const Load& load : description.loads) {
+            const auto vertices = load.where.vertices(starts.back());
+            const auto shares = evenShares(shell.mesh(), shell.restPositions(), vertices);
+            for (std::size_t i = 0; i < vertices.size(); ++i)
+                shell.setForce(vertices[i], shell.forces().col(vertices[i]) + shares[i] * load.total);
+        }
+        shell.setPressure(description.pressure);
+    }
+
+    /// Puts kinematic bodies where they are at the end of the coming step; Bullet takes their velocity from that.
+    void moveKinematicBodies(double end) {
+        for (Body& body : bodies) {
+            if (!body.description->kinematic) continue;
+            const Kinematic& motion = *body.description->kinematic;
+            const Transform& start = body.description->transform;
+            const Vec3 origin = start.position + std::min(end, motion.until) * motion.velocity;
+            btTransform pose = body.body->getWorldTransform();
+            pose.setOrigin(toBullet(Vec3(origin + start.rotation() * body.centre)));
+            body.body->setWorldTransform(pose);
+        }
+    }
+
+    void step(FrameReport& report) {
+        const double h = scene.dt / scene.substeps;
+        moveKinematicBodies(time + h);
+        using Clock = std::chrono::steady_clock;
+        const auto start = Clock::now();
+        world.stepSimulation(btScalar(h), 0);  // 0: exactly one step, of exactly h
+        report.seconds += std::chrono::duration<double>(Clock::now() - start).count();
+        time += h;
+        const bullet::WorldReport& last = shells.lastStep();
+        report.contacts = last.contacts;
+        report.pcgIterations += last.pcgIterations;
+        report.mostIterations = std::max(report.mostIterations, last.pcgIterations);
+        report.solves += last.solves;
+        report.converged = report.converged && last.converged;
+        report.finite = report.finite && last.finite;
+    }
+
+    BodyState state(const Body& body) const {
+        const btTransform& pose = body.body->getWorldTransform();
+        BodyState state;
+        state.description = body.description;
+        state.isDynamic = body.description->mass > 0;
+        state.rotation = fromBullet(pose.getBasis());
+        state.centre = fromBullet(pose.getOrigin());
+        state.position = state.centre - state.rotation * body.centre;
+        state.velocity = fromBullet(body.body->getLinearVelocity());
+        state.angularVelocity = fromBullet(body.body->getAngularVelocity());
+        state.inertia = fromBullet(body.inertia);
+        return state;
+    }
+
+    Scene scene;
+    btDefaultCollisionConfiguration configuration;
+    btCollisionDispatcher dispatcher{&configuration};
+    btDbvtBroadphase broadphase;
+    btSequentialImpulseConstraintSolver solver;
+    btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
+    std::vector<Body> bodies;
+    bullet::ShellWorld shells{world};
+    std::vector<Points> starts;  ///< positions at time 0, unperturbed
+    double time = 0.0;
+};
+
+World::World(const Scene& scene) : m_impl(std::make_unique<Impl>(scene)) {}
+World::~World() = default;
+
+FrameReport World::step() {
+    FrameReport report;
+    for (int i = 0; i < scene().substeps; ++i) m_impl->step(report);
+    return report;
+}
+
+double World::time() const {
+    return m_impl->time;
+}
+const Scene& World::scene() const {
+    return m_impl->scene;
+}
+int World::shellCount() const {
+    return m_impl->shells.size();
+}
+const Shell& World::shell(int index) const {
+    return m_impl->shells[index].shell();
+}
+const Points& World::initialPositions(int shell) const {
+    return m_impl->starts[shell];
+}
+int World::contactCount(int shell) const {
+    return static_cast<int>(m_impl->shells[shell].contacts().size());
+}
+int World::rejectedSteps() const {
+    return m_impl->shells.lastStep().rejectedSteps;
+}
+std::vector<std::string> World::takeWarnings() {
+    return m_impl->shells.takeWarnings();
+}
+
+Points World::contactForces(int shell) const {
+    Points forces = Points::Zero(3, this->shell(shell).vertexCount());
+    const double h = scene().dt / scene().substeps;
+    for (const ContactImpulse& hit : m_impl->shells[shell].contacts())
+        for (int k = 0; k < 3; ++k) forces.col(hit.contact.vertices[k]) += hit.contact.weights[k] / h * hit.impulse;
+    return forces;
+}
+
+std::vector<BodyState> World::bodies() const {
+    std::vector<BodyState> states;
+    for (const auto& body : m_impl->bodies) states.push_back(m_impl->state(body));
+    return states;
+}
+
+Vec3 World::linearMomentum() const {
+    Vec3 momentum = Vec3::Zero();
+    for (int k = 0; k < shellCount(); ++k) momentum += fromBullet(m_impl->shells[k].linearMomentum());
+    for (const auto& body : m_impl->bodies)
+        if (body.description->mass > 0) momentum += body.description->mass * fromBullet(body.body->getLinearVelocity());
+    return momentum;
+}
+
+std::string World::precision() {
+    return std::is_same_v<btScalar, double> ? "double" : "float";
+}
+
+std::string World::bulletVersion() {
+    return std::to_string(btGetVersion() / 100) + "." + std::to_string(btGetVersion() % 100);
+}
+
+}  // namespace jacket::demo

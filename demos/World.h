@@ -1,0 +1,64 @@
+#pragma once
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "Scene.h"
+
+/// A scene as a running Bullet world with shells. This header says nothing of Bullet: its precision is that of the
+/// library this is linked to.
+namespace jacket::demo {
+
+/// Where a body is and how it moves.
+struct BodyState {
+    const BodyDescription* description = nullptr;
+    bool isDynamic = false;
+    Vec3 position = Vec3::Zero();         ///< of the frame that the shape is given in [m]
+    Mat3 rotation = Mat3::Identity();     ///< of that frame
+    Vec3 centre = Vec3::Zero();           ///< centre of mass [m]
+    Vec3 velocity = Vec3::Zero();         ///< of the centre of mass [m/s]
+    Vec3 angularVelocity = Vec3::Zero();  ///< [rad/s]
+    Vec3 inertia = Vec3::Zero();          ///< about the frame's axes [kg m^2]
+};
+
+/// What the steps of one frame did and cost.
+struct FrameReport {
+    int contacts = 0;        ///< that carried an impulse in the last step
+    int pcgIterations = 0;   ///< over all steps of the frame
+    int mostIterations = 0;  ///< of one of its steps
+    int solves = 0;
+    bool converged = true, finite = true;
+    double seconds = 0.0;  ///< of wall time in stepSimulation
+};
+
+class World {
+  public:
+    /// Reads the meshes and builds everything; throws InputError.
+    explicit World(const Scene& scene);
+    ~World();
+
+    FrameReport step();  ///< one frame of scene.dt
+    double time() const;
+
+    const Scene& scene() const;
+    int shellCount() const;
+    const Shell& shell(int index) const;
+    int contactCount(int shell) const;  ///< that carried an impulse in the last step
+    /// Impulses of the last step's contacts on the vertices of a shell, as forces [N].
+    Points contactForces(int shell) const;
+    const Points& initialPositions(int shell) const;
+    std::vector<BodyState> bodies() const;
+    Vec3 linearMomentum() const;  ///< of shells and dynamic bodies, at one moment [N s]
+    int rejectedSteps() const;    ///< since the start
+
+    std::vector<std::string> takeWarnings();
+    static std::string precision();      ///< "double" or "float": Bullet's
+    static std::string bulletVersion();  ///< "3.24"
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> m_impl;
+};
+
+}  // namespace jacket::demo

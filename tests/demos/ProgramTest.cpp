@@ -1,0 +1,150 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "Commands.h"
+#include "Json.h"
+#include "TemporaryFolder.h"
+
+namespace jacket::demo {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+    int exitCode;
+    std::string out, err;
+};
+
+Outcome jacket(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "jacket");
+    std::vector<const char*> argv;
+    for (const std::string& argument : arguments) argv.push_back(argument.c_str());
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    const int exitCode = runProgram(static_cast<int>(argv.size()), argv.data());
+    return {exitCode, testing::internal::GetCapturedStdout(), testing::internal::GetCapturedStderr()};
+}
+
+constexpr const char* kFallingSheet = R"({
+    "seconds": 0.1, "gravity": [0, -10, 0],
+    "shells": [ { "name": "sheet", "mesh": { "grid": { "size": [1, 1], "cells": [3, 3] } },
+                  "material": { "young": 1e6, "thickness": 1e-3, "density": 1000 } } ],
+    "probes": [ { "name": "fall", "shell": "sheet", "quantity": "max_displacement" } ]
+})";
+
+TEST(Program, WritesEveryFileAndEveryKeyOfTheResult) {
+    const TemporaryFolder folder;
+    const std::string scene = folder.write("fall.json", kFallingSheet);
+    const Outcome run = jacket({"run", scene, "--out", folder / "out", "--png", "3", "--size", "64x48", "--quiet"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_EQ(run.out + run.err, "");
+    for (const char* name : {"scene.json", "mesh_0.obj", "mesh_0.pc2", "log.csv", "result.json", "frames/000000.png",
+                             "frames/000003.png", "frames/000006.png"})
+        EXPECT_TRUE(fs::exists(folder / "out" / name)) << name;
+    const std::string log = TemporaryFolder::read(folder / "out/log.csv");
+    EXPECT_EQ(std::count(log.begin(), log.end(), '\n'), 1 + 6);
+    EXPECT_EQ(fs::file_size(folder / "out/mesh_0.pc2"), 32u + 7 * 16 * 12);
+
+    const Json result = parseJson(TemporaryFolder::read(folder / "out/result.json"), "result.json");
+    for (const char* key :
+         {"version",        "scene",           "seed",   "precision",      "threads",        "dt",
+          "frames",         "simulated_s",     "wall_s", "ms_per_step",    "pcg_iterations", "max_stretch",
+          "peak_stretch",   "max_penetration", "energy", "momentum_error", "converged",      "finite",
+          "rejected_steps", "shells",          "bodies", "probes"})
+        EXPECT_TRUE(result.contains(key)) << key;
+    for (const char* key : {"kinetic", "membrane", "bending", "plastic_work", "start", "end"})
+        EXPECT_TRUE(result["energy"].contains(key)) << key;
+    EXPECT_EQ(result["scene"], "fall");
+    EXPECT_EQ(result["frames"], 6);
+    EXPECT_EQ(result["shells"][0]["vertices"], 16);
+    EXPECT_EQ(result["shells"][0]["triangles"], 18);
+    EXPECT_LT(result["momentum_error"].get<double>(), 1e-5);
+    // six steps of backward Euler from rest: g h^2 (1 + 2 + ... + 6)
+    EXPECT_NEAR(result["probes"]["fall"].get<double>(), 10 * 21.0 / 3600, 1e-5);
+}
+
+TEST(Program, RunsTheSceneThatItWroteToTheSameEnd) {
+    const TemporaryFolder folder;
+    const std::string scene = folder.write("fall.json", kFallingSheet);
+    ASSERT_EQ(jacket({"run", scene, "--out", folder / "a", "--quiet"}).exitCode, 0);
+    ASSERT_EQ(jacket({"run", folder / "a/scene.json", "--out", folder / "b", "--quiet"}).exitCode, 0);
+    EXPECT_EQ(TemporaryFolder::read(folder / "a/mesh_0.pc2"), TemporaryFolder::read(folder / "b/mesh_0.pc2"));
+}
+
+TEST(Program, BadInputIsExitCode2WithOneMessageAndNothingWritten) {
+    const TemporaryFolder folder;
+    const std::string scene = folder.write("fall.json", kFallingSheet);
+    const std::string out = folder / "out";
+    const std::pair<std::vector<std::string>, const char*> cases[] = {
+        {{"run", folder / "none.json"}, "none.json: there is no such file"},
+        {{"run", "trampolin"}, "did you mean \"trampoline\"?"},
+        {{"run", scene, "--dt", "fast"}, "--dt [s] must be a number > 0"},
+        {{"run", scene, "--seconds", "-1"}, "--seconds [s] must be a number > 0"},
+        {{"run", scene, "--set", "shells.0.pin=[{\"vertices\":[99]}]"}, "vertex 99 does not exist"},
+        {{"run", scene, "--set", "shells.0.pin=[{\"box\":[[5,5,5],[6,6,6]]}]"}, "selects no vertex"},
+        {{"run", scene, "--set", "shells.0.material.thickness=-1"}, "must be > 0, got -1"},
+        {{"run", scene, "--set", "probes.0.box=[[5,5,5],[6,6,6]]"}, "probes.0.box selects no vertex"},
+        {{"run", scene, "--png", "0"}, "--png must be >= 1"},
+        {{"run", scene, "--png", "1", "--size", "big"}, "--size must be WIDTHxHEIGHT"},
+        {{"run", "bowl_plastic"}, "plasticity is not available yet"},
+    };
+    for (auto [arguments, expected] : cases) {
+        arguments.insert(arguments.end(), {"--out", out});
+        const Outcome run = jacket(arguments);
+        EXPECT_EQ(run.exitCode, 2) << expected;
+        EXPECT_NE(run.err.find(expected), std::string::npos) << run.err;
+        EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+        EXPECT_EQ(folder.entries(), 1) << expected;
+    }
+    EXPECT_EQ(jacket({"run", scene, "--png", "1"}).exitCode, 2);
+    EXPECT_EQ(jacket({"run", scene, "--nonsense"}).exitCode, 2);
+    EXPECT_EQ(jacket({}).exitCode, 2);
+}
+
+TEST(Program, BadMeshesAreNamedByFileAndLineOrIndex) {
+    const TemporaryFolder folder;
+    const std::string start = "v 0 0 0\nv 1 0 0\nv 0 0 1\n";
+    const std::pair<std::string, const char*> cases[] = {
+        {start + "f 1 2 7\n", "mesh.obj:4"},
+        {"v 0 0 0\nv nan 0 0\nv 0 0 1\nf 1 2 3\n", "mesh.obj:2"},
+        {start + "v 0.5 0 0\nf 1 2 4\nf 1 2 3\n", "triangle 0"},
+    };
+    const std::string scene =
+        folder.write("scene.json", R"({ "shells": [ { "mesh": { "file": "mesh.obj" }, "material": "cotton" } ] })");
+    for (const auto& [mesh, expected] : cases) {
+        folder.write("mesh.obj", mesh);
+        for (const auto& arguments : {std::vector<std::string>{"run", scene, "--out", folder / "out"},
+                                      std::vector<std::string>{"check", folder / "mesh.obj"}}) {
+            const Outcome run = jacket(arguments);
+            EXPECT_EQ(run.exitCode, 2) << mesh;
+            EXPECT_NE(run.err.find(expected), std::string::npos) << run.err;
+            EXPECT_EQ(folder.entries(), 2);
+        }
+    }
+    folder.write("mesh.obj", start + "f 1 3 2\n");
+    const Outcome good = jacket({"check", folder / "mesh.obj"});
+    EXPECT_EQ(good.exitCode, 0) << good.err;
+    EXPECT_NE(good.out.find("3 vertices, 1 triangles"), std::string::npos) << good.out;
+}
+
+TEST(Program, ListsScenesAndMaterials) {
+    const Outcome table = jacket({"list"});
+    EXPECT_EQ(table.exitCode, 0);
+    EXPECT_NE(table.out.find("trampoline"), std::string::npos);
+    const Json list = parseJson(jacket({"list", "--json"}).out, "list");
+    EXPECT_TRUE(
+        std::any_of(list.begin(), list.end(), [](const Json& entry) { return entry["name"] == "cloth_sphere"; }));
+
+    EXPECT_NE(jacket({"material", "steel", "--thickness", "1e-3"}).out.find("bending stiffness"), std::string::npos);
+    const Outcome unknown = jacket({"material", "stel"});
+    EXPECT_EQ(unknown.exitCode, 2);
+    EXPECT_NE(unknown.err.find("did you mean \"steel\"?"), std::string::npos) << unknown.err;
+    EXPECT_EQ(jacket({"--version"}).exitCode, 0);
+    EXPECT_EQ(jacket({"--help"}).exitCode, 0);
+    EXPECT_EQ(jacket({"run", "--help"}).exitCode, 0);
+}
+
+}  // namespace
+}  // namespace jacket::demo

@@ -1,0 +1,166 @@
+#include <gtest/gtest.h>
+
+#include "Scene.h"
+#include "SceneFile.h"
+#include "TemporaryFolder.h"
+
+namespace jacket::demo {
+namespace {
+
+constexpr const char* kScene = R"({
+    // a comment
+    "dt": "1/120", "seconds": 0.5,
+    "shells": [ { "name": "sheet", "mesh": { "grid": { "size": [1, 1], "cells": [4, 4] } }, "material": "cotton",
+                  "pin": [ { "vertices": [0, 4] } ] } ],
+    "bodies": [ { "name": "ball", "shape": { "sphere": 0.2 }, "mass": 2, "position": [0, 1, 0] } ],
+    "probes": [ { "name": "p", "shell": "sheet", "quantity": "mean_position" } ]
+})";
+
+class SceneTest : public testing::Test {
+  protected:
+    Scene load(const std::string& text, std::vector<std::string> set = {}) {
+        return loadScene(m_folder.write("scene.json", text),
+                         {.set = std::move(set), .dt = {}, .seconds = {}, .seed = {}});
+    }
+    /// What is said about a scene with this change, without the file's name.
+    std::string complaint(const std::string& set) {
+        try {
+            load(kScene, {set});
+        } catch (const InputError& error) {
+            return error.what();
+        }
+        return "accepted";
+    }
+    std::string complaintAbout(const std::string& text) {
+        try {
+            load(text);
+        } catch (const InputError& error) {
+            std::string message = error.what();
+            const std::size_t slash = message.find(m_folder.path().string());
+            return slash == 0 ? message.substr(m_folder.path().string().size() + 1) : message;
+        }
+        return "accepted";
+    }
+    TemporaryFolder m_folder;
+};
+
+TEST_F(SceneTest, ReadsWhatTheFileSays) {
+    const Scene scene = load(kScene);
+    EXPECT_EQ(scene.name, "scene");
+    EXPECT_DOUBLE_EQ(scene.dt, 1.0 / 120);
+    EXPECT_EQ(scene.frames(), 60);
+    EXPECT_DOUBLE_EQ(scene.gravity.y(), -9.81);
+    EXPECT_EQ(scene.bodies.at(0).mass, 2);
+    EXPECT_EQ(std::get<std::vector<int>>(scene.shells.at(0).pins.at(0).what), (std::vector{0, 4}));
+}
+
+TEST_F(SceneTest, WrittenOutItGivesItselfAgain) {
+    const Json written =
+        toJson(load(kScene, {"shells.0.membrane.model=baraff-witkin", "shells.0.membrane.shear=12", "wind=[1,2,3]",
+                             "shells.0.force=[{\"vertices\":[3],\"total\":[0,1,0]}]"}));
+    EXPECT_EQ(toJson(load(written.dump())), written);
+}
+
+TEST_F(SceneTest, SetReplacesValuesByIndexAndByName) {
+    const Scene scene =
+        load(kScene, {"shells.sheet.friction=0.1", "bodies.0.mass=3", "shells.0.material.thickness=0.002",
+                      "shells.0.mesh.grid.cells.1=7", "shells.0.bending=quadratic"});
+    EXPECT_EQ(scene.shells[0].friction, 0.1);
+    EXPECT_EQ(scene.bodies[0].mass, 3);
+    EXPECT_EQ(scene.shells[0].material.thickness, 0.002);
+    EXPECT_EQ(std::get<GridOptions>(scene.shells[0].mesh).cells, Eigen::Vector2i(4, 7));
+    EXPECT_TRUE(std::holds_alternative<QuadraticBending>(scene.shells[0].bending));
+}
+
+TEST_F(SceneTest, EveryMistakeIsNamedWithItsPath) {
+    const std::pair<const char*, const char*> cases[] = {
+        {"shells.0.material.thickness=-0.001",
+         "--set shells.0.material.thickness=-0.001: shells.0.material.thickness [m] must be > 0, got -0.001"},
+        {"shells.sheet.frixion=1", "unknown key \"frixion\"; did you mean \"friction\"?"},
+        {"shell.0.friction=1", "unknown key \"shell\"; did you mean \"shells\"?"},
+        {"shells.sheat.friction=1", "shells has no element \"sheat\": it has one element, 0; did you mean \"sheet\"?"},
+        {"shells.4.friction=1", "shells has no element \"4\": it has one element, 0"},
+        {"shells.0.name.x=1", "shells.0.name is \"sheet\" and has no \"x\" in it"},
+        {"shells.0.friction=rough", "shells.0.friction must be a number, got \"rough\""},
+        {"shells.0.material=cottn", "unknown material \"cottn\"; did you mean \"cotton\"?"},
+        {"shells.0.bending=quadratc", "unknown model \"quadratc\"; did you mean \"quadratic\"?"},
+        {"shells.0.membrane={\"model\":\"stvk\",\"shear\":1}", "shells.0.membrane.shear: unknown key \"shear\""},
+        {"shells.0.pin.0.vertices=[1,-2]", "shells.0.pin.0.vertices.1 must be a vertex index >= 0, got -2"},
+        {"shells.0.pin.0.box=[[0,0,0],[1,1,1]]", "has both \"box\" and \"vertices\""},
+        {"shells.0.mesh={}", "shells.0.mesh must have one of \"file\", \"grid\", \"hemisphere\", \"cylinder\""},
+        {"shells.0.mesh={\"file\":\"none.obj\"}", "shells.0.mesh.file: there is no file"},
+        {"shells.0.mesh.grid.cells=[3,0]", "shells.0.mesh.grid.cells.1 must be >= 1 and <= 10000, got 0"},
+        {"bodies.0.shape={\"box\":[1,1]}", "bodies.0.shape.box must be a list of 3 numbers, got [1,1]"},
+        {"bodies.0.shape={\"sphere\":0}", "bodies.0.shape.sphere [m] must be > 0, got 0"},
+        {"bodies.0.mass=0", "accepted"},
+        {"bodies.0={\"shape\":{\"sphere\":1},\"velocity\":[1,0,0]}", "bodies.0.velocity needs a mass > 0"},
+        {"bodies.0.kinematic={\"velocity\":[1,0,0]}", "bodies.0.kinematic needs mass 0"},
+        {"probes.0.quantity=speed", "has the unknown value \"speed\"; did you mean"},
+        {"probes.0.shell=shet", "probes.0.shell has the unknown value \"shet\"; did you mean \"sheet\"?"},
+        {"dt=0", "dt [s] must be > 0, got 0"},
+        {"dt=1/0", "dt [s] must be a number > 0 or a fraction"},
+        {"gravity=[0,1]", "gravity must be a list of 3 numbers"},
+        {"shells=[]", "shells must have at least one shell"},
+        {"x", "must be path=value"},
+        {"shells..x=1", "the path has an empty part"},
+    };
+    for (const auto& [set, expected] : cases)
+        EXPECT_NE(complaint(set).find(expected), std::string::npos) << set << "\n  " << complaint(set);
+}
+
+TEST_F(SceneTest, WhatIsNotThereYetIsRefused) {
+    const std::pair<const char*, const char*> cases[] = {
+        {"mode=static", "static equilibrium is not available yet"},
+        {"shells.0.self_collision=true", "self-collision is not available yet"},
+        {"shells.0.integrator=bdf2", "\"bdf2\" is not available yet"},
+        {"shells.0.bending=patch", "patch bending is not available yet"},
+        {"shells.0.material.yield=1e8", "plasticity is not available yet"},
+        {"shells.0.clamp=[{\"box\":[[0,0,0],[1,1,1]]}]", "clamping an edge with its tangent is not available yet"},
+        {"bodies.0.shape={\"mesh\":\"a.obj\"}", "a body that is a triangle mesh is not available yet"},
+    };
+    for (const auto& [set, expected] : cases) {
+        EXPECT_THROW(load(kScene, {set}), NotAvailable) << set;
+        EXPECT_NE(complaint(set).find(expected), std::string::npos) << complaint(set);
+    }
+    EXPECT_NO_THROW(load(kScene, {"shells.0.self_collision=false", "shells.0.clamp=[]", "mode=dynamic"}));
+}
+
+TEST_F(SceneTest, SyntaxErrorsNameFileLineAndColumn) {
+    EXPECT_EQ(complaintAbout("{\n  \"dt\": 0.1,\n  \"seconds\" 1\n}").substr(0, 17), "scene.json:3:13: ");
+    EXPECT_NE(complaintAbout("{\"dt\": 1, \"dt\": 2}").find("the key \"dt\" is given twice"), std::string::npos);
+    EXPECT_NE(complaintAbout("{\"dt\": 1e999}").find("scene.json: not valid JSON"), std::string::npos);
+    EXPECT_NE(complaintAbout("[1]").find("must be an object {...}, got [1]"), std::string::npos);
+    EXPECT_NE(complaintAbout("").find("scene.json:1:1: not valid JSON"), std::string::npos);
+}
+
+TEST_F(SceneTest, SelectionsThatSelectNothingAreErrors) {
+    Points x = Points::Zero(3, 2);
+    x.col(1) << 1, 2, 3;
+    const Selection box{Selection::Bounds{{5, 5, 5}, {6, 6, 6}}, "scene.json: shells.0.pin.0"};
+    try {
+        box.vertices(x);
+        FAIL();
+    } catch (const InputError& error) {
+        EXPECT_STREQ(error.what(),
+                     "scene.json: shells.0.pin.0.box selects no vertex: it reaches from [5, 5, 5] to "
+                     "[6, 6, 6], the shell from [0, 0, 0] to [1, 2, 3]");
+    }
+    EXPECT_THROW((Selection{std::vector{2}, ""}.vertices(x)), InputError);
+    EXPECT_EQ((Selection{std::vector{1, 0, 1}, ""}.vertices(x)), (std::vector{0, 1}));
+}
+
+TEST(BundledScenes, CanBeReadOrSayWhatTheyNeed) {
+    const auto scenes = bundledScenes();
+    EXPECT_GE(scenes.size(), 8u);
+    for (const auto& file : scenes) {
+        EXPECT_FALSE(sceneDescription(file).empty()) << file;
+        if (file.stem() == "bowl_plastic")
+            EXPECT_THROW(loadScene(file), NotAvailable);
+        else
+            EXPECT_NO_THROW(loadScene(file)) << file;
+    }
+    EXPECT_THROW(findScene("trampolin"), InputError);
+}
+
+}  // namespace
+}  // namespace jacket::demo
