@@ -28,7 +28,8 @@ struct IslandSolver::Impl {
     std::vector<int> offsets, dynamicIndex;
     std::vector<int> dynamicBodies;  ///< index in IslandInput.bodies of each dynamic body
     Points v, start, y;              ///< all shells
-    Points lastChange;               ///< dv of the last step: the warm start
+    Points lastChange;               ///< dv of the last step
+    Points expected;                 ///< velocities if that goes on: the warm start
     Points unfiltered;               ///< (b - A v) at the solution, soft rows included
     CoupledVector u, reference;
     Eigen::Matrix<double, 6, Eigen::Dynamic> freeTwist;
@@ -53,10 +54,10 @@ StepReport IslandSolver::solve(const IslandInput& input) {
         throw std::invalid_argument("IslandInput.h [s] must be > 0 and finite");
     Impl& s = *m_impl;
     StepReport report;
-    s.gather(input);                                          // one numbering for all shells
-    s.response.begin(input, s.offsets, s.dynamicIndex, s.y);  // contacts at the start, alteration y
-    s.solveStep(input, report);                               // A, b; filtered PCG until the contacts agree
-    if (!s.u.allFinite()) {                                   // state untouched; the caller decides
+    s.gather(input);                                                      // one numbering for all shells
+    s.response.begin(input, s.offsets, s.dynamicIndex, s.expected, s.y);  // contacts at the start, alteration y
+    s.solveStep(input, report);                                           // A, b; filtered PCG until the contacts agree
+    if (!s.u.allFinite()) {                                               // state untouched; the caller decides
         report.finite = report.converged = false;
         return report;
     }
@@ -83,6 +84,7 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
         dynamicBodies.push_back(static_cast<int>(b));
     }
     if (lastChange.cols() != count) lastChange.setZero(3, count);
+    expected = start + lastChange;
 }
 
 /// One linear solve, as Baraff & Witkin have it. Only where it has stretched an edge far beyond what it was, which the
@@ -150,7 +152,7 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         tolerance = std::min(tolerance, shell->settings().tolerance);
         maxIterations = std::max(maxIterations, shell->settings().maxIterations);
     }
-    Points guess = report.solves == 0 ? Points(start + lastChange) : v;
+    Points guess = report.solves == 0 ? expected : v;
     Eigen::Matrix<double, 6, Eigen::Dynamic> guessTwist = report.solves == 0 ? freeTwist : u.w;
     u.resize(static_cast<int>(start.cols()), system.bodyCount());
     const double floor = floorOfReference(input);

@@ -13,12 +13,12 @@ constexpr double kRowPenalty = 10.0;  // penalty of a soft row over the stiffnes
 constexpr double kAlteration = 0.2;   // share of a penetration that a step takes back, and share of an edge at most
 constexpr double kMostOffset =
     0.15;  // of an edge: how far vertices are lifted off a curved body for their chords' sake
-constexpr double kOffsetDecay = 0.99;  // a step: a lift that is no longer needed goes away
-constexpr double kPull = 1e-3;         // of the largest impulse: a contact that pulls less may stay for the step
-constexpr int kPatience = 10;          // steps before a contact that slid is tried as a sticking one again
-constexpr int kFrictionRounds = 2;     // then the lagged friction of the last round stands
-constexpr int kFreezeRound = 7;        // from here on normals stay: a triangle that tips to and fro would never settle
-constexpr int kMostChanges = 10;       // a contact that flips more often than this stays as it is
+constexpr double kOffsetDecay = 0.998;  // a step: a lift that is no longer needed goes away
+constexpr double kPull = 1e-3;          // of the largest impulse: a contact that pulls less may stay for the step
+constexpr int kPatience = 10;           // steps before a contact that slid is tried as a sticking one again
+constexpr int kFrictionRounds = 2;      // then the lagged friction of the last round stands
+constexpr int kFreezeRound = 7;         // from here on normals stay: a triangle that tips to and fro would never settle
+constexpr int kMostChanges = 10;        // a contact that flips more often than this stays as it is
 
 double meanEdge(const Shell& shell) {
     double sum = 0.0;
@@ -55,8 +55,9 @@ ContactResponse::Touch ContactResponse::makeTouch(const Contact& contact) const 
 }
 
 void ContactResponse::begin(const IslandInput& input, const std::vector<int>& offsets,
-                            const std::vector<int>& dynamicIndex, Points& y) {
+                            const std::vector<int>& dynamicIndex, const Points& expected, Points& y) {
     m_input = input;
+    m_expected = &expected;
     m_offsets = offsets;
     m_dynamicIndex = dynamicIndex;
     m_touches.clear();
@@ -130,12 +131,9 @@ void ContactResponse::keepEarliest() {
 
 /// When a contact closes if nothing else happens, from the start of the step; infinite if it does not [s].
 double ContactResponse::timeOfTouch(const Touch& touch) const {
-    const Shell& shell = *m_input.shells[touch.contact.shell];
     const CoupledBody& body = m_input.bodies[touch.contact.body];
     Vec3 velocity = -pointVelocity(body.freeTwist, touch.arm);
-    for (int a = 0; a < 3; ++a)
-        velocity += touch.contact.weights[a] * shell.velocities().col(touch.contact.vertices[a]);
-    if (!m_held[globalVertex(touch.contact, 0)]) velocity += m_input.h * m_input.gravity;
+    for (int a = 0; a < 3; ++a) velocity += touch.contact.weights[a] * m_expected->col(globalVertex(touch.contact, a));
     const double closing = -velocity.dot(touch.contact.normal);
     return closing > 0.0 ? std::max(touch.contact.gap, 0.0) / closing : std::numeric_limits<double>::infinity();
 }
@@ -341,12 +339,12 @@ bool ContactResponse::updateFriction(const CoupledSystem& system, const IslandVe
             touch.patience = kPatience;
             touch.drag = limit / std::max((force - limit) / vertexStiffness(system, touch), still);
             changed = true;
-        } else if (slip < still && touch.patience == 0) {
+        } else if (slip < still && touch.patience == 0 && !touch.isRow) {
             touch.sticks = true;
             changed = true;
         } else {
             const double drag = limit / std::max(slip, 0.1 * still);
-            if (std::abs(drag - touch.drag) > 0.05 * touch.drag) changed = true;
+            if (std::abs(drag - touch.drag) * slip > 0.05 * limit) changed = true;
             touch.drag = drag;
         }
     }

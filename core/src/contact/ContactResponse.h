@@ -27,8 +27,10 @@ class ContactResponse {
     static constexpr int kMaxRounds = 16;  ///< usually 1 to 3; more while a body hits
 
     /// Contacts at the start of the step, and the position alteration y of vertices that stand inside a body.
+    /// `expected`: velocities at the end of the step as they would be if the last step's change went on; kept by
+    /// reference.
     void begin(const IslandInput& input, const std::vector<int>& offsets, const std::vector<int>& dynamicIndex,
-               Points& y);
+               const Points& expected, Points& y);
     /// Turns held vertices and active contacts into constraints and rows.
     void writeTo(CoupledSystem& system);
     /// Reads a solve. True when the active set, a linearisation or friction changed so that another solve is needed.
@@ -92,6 +94,7 @@ class ContactResponse {
     int globalVertex(const Contact& c, int corner) const { return m_offsets[c.shell] + c.vertices[corner]; }
 
     IslandInput m_input;
+    const Points* m_expected = nullptr;
     std::vector<int> m_offsets, m_dynamicIndex;
     std::vector<Touch> m_touches;
     std::map<Key, int> m_index;
