@@ -57,7 +57,7 @@ StepReport IslandSolver::solve(const IslandInput& input) {
     s.gather(input);                                                      // one numbering for all shells
     s.response.begin(input, s.offsets, s.dynamicIndex, s.expected, s.y);  // contacts at the start, alteration y
     s.solveStep(input, report);                                           // A, b; filtered PCG until the contacts agree
-    if (!s.u.allFinite()) {                                               // state untouched; the caller decides
+    if (!s.u.allFinite() || !s.unfiltered.allFinite()) {                  // state untouched; the caller decides
         report.finite = report.converged = false;
         return report;
     }
@@ -95,7 +95,7 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
     assemble(input, false);
     for (int newton = 1;; ++newton) {
         solveRounds(input, report);
-        if (newton == kMostNewtonSteps || !u.allFinite() || !overstretches(input)) return;
+        if (newton == kMostNewtonSteps || !unfiltered.allFinite() || !overstretches(input)) return;
         assemble(input, true);
     }
 }
@@ -175,9 +175,9 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         report.pcgIterations += solve.iterations;
         report.residual = solve.residual;
         report.converged = solve.converged;
-        if (!u.allFinite()) return;
         CoupledVector& r = reference;  // its memory is free now
         system.residual(u, r, unfiltered);
+        if (!u.allFinite() || !unfiltered.allFinite()) return;
         system.velocities(u, v);
         if (!response.update(system, {v, u.w, unfiltered}, y, round)) break;
         guess = v;

@@ -69,31 +69,41 @@ void Shell::setVelocities(const Points& v) {
     m_v = v;
 }
 
-void Shell::pin(int vertex) {
+void Shell::requireVertex(int vertex, const char* what) const {
     if (vertex < 0 || vertex >= vertexCount())
-        throw std::out_of_range("Shell::pin: vertex must be 0.." + std::to_string(vertexCount() - 1) + ", got " +
-                                std::to_string(vertex));
+        throw std::out_of_range(std::string(what) + ": vertex must be 0.." + std::to_string(vertexCount() - 1) +
+                                ", got " + std::to_string(vertex));
+}
+
+void Shell::pin(int vertex) {
+    requireVertex(vertex, "Shell::pin");
     m_pinCount += m_pinned[vertex] ? 0 : 1;
     m_pinned[vertex] = 1;
     m_pinTarget[vertex] = m_x.col(vertex);
 }
 
 void Shell::movePin(int vertex, const Vec3& target) {
+    requireVertex(vertex, "Shell::movePin");
     requireFinite(target, "Shell::movePin: target");
     pin(vertex);
     m_pinTarget[vertex] = target;
 }
 
 void Shell::unpin(int vertex) {
-    m_pinCount -= m_pinned.at(vertex) ? 1 : 0;
+    requireVertex(vertex, "Shell::unpin");
+    m_pinCount -= m_pinned[vertex] ? 1 : 0;
     m_pinned[vertex] = 0;
 }
 
 void Shell::setForce(int vertex, const Vec3& force) {
+    requireVertex(vertex, "Shell::setForce");
     requireFinite(force, "Shell::setForce: force");
-    if (vertex < 0 || vertex >= vertexCount())
-        throw std::out_of_range("Shell::setForce: vertex " + std::to_string(vertex));
     m_force.col(vertex) = force;
+}
+
+void Shell::setPressure(double pressure) {
+    if (!std::isfinite(pressure)) throw std::invalid_argument("Shell::setPressure: pressure [Pa] must be finite");
+    m_pressure = pressure;
 }
 
 ShellEnergy Shell::energy() const {

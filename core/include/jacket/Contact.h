@@ -17,8 +17,8 @@ struct CoupledBody {
     double radius = 0.0;            ///< of a ball around `position` that holds the body [m]
     const void* key = nullptr;      ///< the same from step to step: whose contacts to remember
     bool prescribed = false;        ///< static, kinematic or sleeping: moves with freeTwist whatever the shells do
-    Vec6 twist = Vec6::Zero();      ///< out: solved twist at the end of the step
-    Vec6 impulse = Vec6::Zero();    ///< out: what the shells gave it, about its centre of mass [N s, N m s]
+    Vec6 twist = Vec6::Zero();      ///< out: solved twist at the end of the step, to the solve's tolerance
+    Vec6 impulse = Vec6::Zero();    ///< out: what the shells gave it, exactly, about its centre of mass [N s, N m s]
 };
 
 /// Where a piece of a shell meets a body: one vertex (weights 1 0 0), or a point of an edge or triangle.

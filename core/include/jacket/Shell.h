@@ -21,7 +21,7 @@ enum class Preconditioner { BlockJacobi, IncompleteCholesky };
 struct ShellSettings {
     MembraneModel membrane = StVenantKirchhoffMembrane{};
     BendingModel bending = DihedralBending{};
-    Preconditioner preconditioner = Preconditioner::IncompleteCholesky;
+    Preconditioner preconditioner = Preconditioner::IncompleteCholesky;  ///< of an island: its first shell's
     double tolerance = 1e-3;   ///< of the linear solve, relative, in the preconditioner's norm
     int maxIterations = 1000;  ///< of one linear solve
 };
@@ -73,7 +73,7 @@ class Shell {
     void setForce(int vertex, const Vec3& force);
     const Points& forces() const { return m_force; }
     /// Pressure on the side that the normals point away from, so that > 0 inflates a closed shell [Pa].
-    void setPressure(double pressure) { m_pressure = pressure; }
+    void setPressure(double pressure);
     double pressure() const { return m_pressure; }
 
     ShellEnergy energy() const;
@@ -93,6 +93,7 @@ class Shell {
 
   private:
     friend class IslandSolver;
+    void requireVertex(int vertex, const char* what) const;  ///< throws std::out_of_range
     std::unique_ptr<HalfEdgeMesh> m_mesh;
     ShellMaterial m_material;
     ShellSettings m_settings;

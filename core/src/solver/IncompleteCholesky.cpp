@@ -40,6 +40,7 @@ bool IncompleteCholesky::tryFactor(const BlockMatrix& matrix, const std::vector<
         for (std::size_t i = 0; i < diagonal.size(); ++i)
             m_inverse[i] = Mat3::Identity() / std::max(diagonal[i].trace() / 3.0, 1e-300);
         std::fill(m_lower.begin(), m_lower.end(), Mat3::Zero());
+        m_shift = 0.0;
         return true;
     }
     for (int i = 0; i < matrix.size(); ++i) {
