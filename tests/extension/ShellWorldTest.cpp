@@ -139,6 +139,33 @@ TEST(ShellWorld, RayTestsFindTheTriangle) {
     EXPECT_GE(upper.z(), 0.7f);
 }
 
+TEST(ShellWorld, DrawsEdgesPinsAndContacts) {
+    struct Lines : btIDebugDraw {
+        int lines = 0, mode = DBG_DrawWireframe;
+        void drawLine(const btVector3&, const btVector3&, const btVector3&) override { ++lines; }
+        void drawContactPoint(const btVector3&, const btVector3&, btScalar, int, const btVector3&) override {}
+        void reportErrorWarning(const char*) override {}
+        void draw3dText(const btVector3&, const char*) override {}
+        void setDebugMode(int m) override { mode = m; }
+        int getDebugMode() const override { return mode; }
+    } drawer;
+    BulletScene scene;
+    scene.addBody(std::make_unique<btStaticPlaneShape>(btVector3(0, 1, 0), btScalar(0)), 0, btVector3(0, 0, 0));
+    auto& sheet = scene.shells->add(squareSheet(1, 4), trampolineCloth());
+    scene.step(1.0 / 60);
+    scene.shells->debugDraw(&drawer);
+    const int edges = static_cast<int>(sheet.shell().mesh().edges().size());
+    ASSERT_GT(sheet.contacts().size(), 0u);
+    EXPECT_EQ(drawer.lines, edges + static_cast<int>(sheet.contacts().size()));
+    sheet.pin(0);
+    const int before = drawer.lines;
+    scene.shells->debugDraw(&drawer);
+    EXPECT_GT(drawer.lines - before, before);  // and a small sphere
+    scene.world.setDebugDrawer(&drawer);
+    scene.world.debugDrawWorld();  // Bullet's own drawing reaches the shell too
+    scene.shells->debugDraw(nullptr);
+}
+
 TEST(ShellWorld, ZeroStepIsNoStep) {
     BulletScene scene;
     auto& sheet = scene.shells->add(squareSheet(1, 4), trampolineCloth());
