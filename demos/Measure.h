@@ -32,9 +32,8 @@ struct FrameRecord {
 
 FrameRecord measure(const World& world, int frame, const FrameReport& report = {});
 
-/// How deep the deepest vertex, edge midpoint or centroid of a shell stands inside a body's true surface; 0: none does
-/// [m].
-double deepestPenetration(const World& world);
+/// Of vertices, edge midpoints and centroids, inside the true surface of a body.
+Penetration deepestPenetration(const World& world);
 
 /// Mass of shells and moving bodies [kg].
 double movingMass(const World& world);
