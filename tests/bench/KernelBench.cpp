@@ -1,0 +1,90 @@
+// Kernels of a step on the draped sheet's matrix, n vertices a side: assembly, product, preconditioner, whole step.
+#include <benchmark/benchmark.h>
+
+#include "ShellAssembly.h"
+#include "jacket/Shell.h"
+#include "solver/IncompleteCholesky.h"
+
+namespace jacket {
+namespace {
+
+constexpr double kStep = 1.0 / 60;
+const Vec3 kGravity{0, -9.81, 0};
+
+/// The drape scene's sheet (E t = 1e4 N/m, D = 1e-4 N m, 0.2 kg/m^2), one edge pinned, after half a second of swinging.
+Shell swingingSheet(int n, const BendingModel& bending = DihedralBending{}) {
+    ShellMaterial m{.young = 3.03e7, .poisson = 0.3, .thickness = 3.3e-4, .density = 605.0};
+    m.stretchStiffnessOverride = 1e4;
+    m.bendingStiffnessOverride = 1e-4;
+    m.areaDensityOverride = 0.2;
+    Shell sheet(makeGrid({.size = {2, 2}, .cells = {n - 1, n - 1}}), m, {.bending = bending});
+    for (int i = 0; i < sheet.vertexCount(); ++i)
+        if (sheet.restPositions()(0, i) < -1 + 1e-9) sheet.pin(i);
+    for (int k = 0; k < 30; ++k) sheet.step(kStep, kGravity);
+    return sheet;
+}
+
+void perVertex(benchmark::State& state) {
+    state.counters["ns/vertex"] =
+        benchmark::Counter(double(state.range(0) * state.range(0)),
+                           benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+
+template <class Bending>
+void assembly(benchmark::State& state) {
+    const Shell sheet = swingingSheet(int(state.range(0)), Bending{});
+    ShellAssembly assembly(sheet, sheet.restPositions());
+    const Points y = Points::Zero(3, sheet.vertexCount());
+    for (auto _ : state) benchmark::DoNotOptimize(&assembly.assemble(sheet, kStep, kGravity, nullptr, y));
+    perVertex(state);
+}
+BENCHMARK(assembly<DihedralBending>)->Arg(31)->Arg(101);
+BENCHMARK(assembly<QuadraticBending>)->Arg(31)->Arg(101);
+BENCHMARK(assembly<CubicShellBending>)->Arg(31)->Arg(101);
+BENCHMARK(assembly<DihedralDifferenceBending>)->Arg(31);
+
+void product(benchmark::State& state) {
+    const Shell sheet = swingingSheet(int(state.range(0)));
+    ShellAssembly assembly(sheet, sheet.restPositions());
+    const Points y = Points::Zero(3, sheet.vertexCount());
+    const BlockMatrix& matrix = assembly.assemble(sheet, kStep, kGravity, nullptr, y).matrix;
+    Points result(3, sheet.vertexCount());
+    for (auto _ : state) {
+        matrix.multiply(sheet.positions().data(), result.data());
+        benchmark::ClobberMemory();
+    }
+    perVertex(state);
+}
+BENCHMARK(product)->Arg(31)->Arg(101);
+
+void factorOrApply(benchmark::State& state, bool factorEach) {
+    const Shell sheet = swingingSheet(int(state.range(0)));
+    ShellAssembly assembly(sheet, sheet.restPositions());
+    const Points y = Points::Zero(3, sheet.vertexCount());
+    const BlockMatrix& matrix = assembly.assemble(sheet, kStep, kGravity, nullptr, y).matrix;
+    IncompleteCholesky factor;
+    factor.factor(matrix, matrix.diagonal(), matrix.lower());
+    Points result(3, sheet.vertexCount());
+    for (auto _ : state) {
+        if (factorEach)
+            factor.factor(matrix, matrix.diagonal(), matrix.lower());
+        else
+            factor.apply(sheet.positions().data(), result.data());
+        benchmark::ClobberMemory();
+    }
+    perVertex(state);
+}
+BENCHMARK_CAPTURE(factorOrApply, factor, true)->Arg(31)->Arg(101);
+BENCHMARK_CAPTURE(factorOrApply, apply, false)->Arg(31)->Arg(101);
+
+void wholeStep(benchmark::State& state) {
+    Shell sheet = swingingSheet(int(state.range(0)));
+    for (auto _ : state) benchmark::DoNotOptimize(sheet.step(kStep, kGravity));
+    perVertex(state);
+}
+BENCHMARK(wholeStep)->Arg(11)->Arg(31)->Arg(101)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace jacket
+
+BENCHMARK_MAIN();
