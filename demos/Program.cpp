@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
 
 #include "Commands.h"
@@ -28,6 +29,15 @@ int reportUsage(const CLI::App& app, const CLI::ParseError& error) {
     return kBadInput;
 }
 
+/// A misspelt command; CLI11 would say that one is required.
+void checkCommand(const CLI::App& app, int argc, const char* const* argv) {
+    if (argc < 2 || argv[1][0] == '-') return;
+    std::vector<std::string> names;
+    for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+    if (std::find(names.begin(), names.end(), argv[1]) == names.end())
+        throw InputError("there is no command \"" + std::string(argv[1]) + "\"" + suggestion(argv[1], names));
+}
+
 }  // namespace
 
 int runProgram(int argc, const char* const* argv) {
@@ -42,6 +52,7 @@ int runProgram(int argc, const char* const* argv) {
         addRunCommand(app, exitCode);
         addCheckCommand(app, exitCode);
         addMaterialCommand(app, exitCode);
+        checkCommand(app, argc, argv);
         app.parse(argc, argv);
         return exitCode;
     } catch (const CLI::ParseError& error) {

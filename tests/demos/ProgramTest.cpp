@@ -101,6 +101,7 @@ TEST(Program, BadInputIsExitCode2WithOneMessageAndNothingWritten) {
     EXPECT_EQ(jacket({"run", scene, "--png", "1"}).exitCode, 2);
     EXPECT_EQ(jacket({"run", scene, "--nonsense"}).exitCode, 2);
     EXPECT_EQ(jacket({}).exitCode, 2);
+    EXPECT_NE(jacket({"rum"}).err.find("there is no command \"rum\"; did you mean \"run\"?"), std::string::npos);
 }
 
 TEST(Program, BadMeshesAreNamedByFileAndLineOrIndex) {
