@@ -4,7 +4,9 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,12 @@ double ShellMaterial::areaDensity() const {
     return areaDensityOverride.value_or(density * thickness);
 }
 
+double ShellMaterial::yieldCurvature() const {
+    const double stiffness = bendingStiffness();
+    if (!yieldStress || stiffness == 0.0) return std::numeric_limits<double>::infinity();
+    return *yieldStress * thickness * thickness / (6.0 * stiffness);
+}
+
 namespace {
 
 void requirePositive(double value, std::string_view field) {
@@ -35,6 +43,19 @@ void requirePositive(double value, std::string_view field) {
 void requireNotNegative(double value, std::string_view field) {
     requireParameter(value >= 0.0, field, ">= 0", value);
     requireParameter(std::isfinite(value), field, "finite", value);
+}
+
+void validateOrthotropy(const ShellMaterial& m) {
+    const ShellMaterial::Orthotropy& o = *m.orthotropy;
+    requirePositive(o.weftYoung, "ShellMaterial.orthotropy.weftYoung [Pa]");
+    requirePositive(o.shear, "ShellMaterial.orthotropy.shear [Pa]");
+    requirePositive(o.warpDirection.norm(), "ShellMaterial.orthotropy.warpDirection's length [-]");
+    // else some pair of stretches along warp and weft would release energy
+    const double limit = m.stretchStiffness() / (m.poisson * m.poisson * m.thickness);  // infinite for nu = 0
+    if (o.weftYoung < limit) return;
+    std::ostringstream rule;
+    rule << "< E_1 / nu_12^2 = " << limit << " (positive definite stiffness)";
+    requireParameter(false, "ShellMaterial.orthotropy.weftYoung [Pa]", rule.str(), o.weftYoung);
 }
 
 }  // namespace
@@ -49,6 +70,9 @@ void validate(const ShellMaterial& m) {
     if (m.bendingStiffnessOverride)
         requireNotNegative(*m.bendingStiffnessOverride, "ShellMaterial.bendingStiffnessOverride [N m]");
     if (m.areaDensityOverride) requirePositive(*m.areaDensityOverride, "ShellMaterial.areaDensityOverride [kg/m^2]");
+    if (m.yieldStress) requirePositive(*m.yieldStress, "ShellMaterial.yieldStress [Pa]");
+    requireNotNegative(m.hardening, "ShellMaterial.hardening [Pa]");
+    if (m.orthotropy) validateOrthotropy(m);
     requireNotNegative(m.stiffnessDamping, "ShellMaterial.stiffnessDamping [s]");
     requireNotNegative(m.massDamping, "ShellMaterial.massDamping [1/s]");
 }

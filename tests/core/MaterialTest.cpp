@@ -82,6 +82,56 @@ TEST(ShellMaterialTest, ValidationNamesFieldRuleAndValue) {
               "ShellMaterial.massDamping [1/s] must be >= 0, got -1");
 }
 
+TEST(ShellMaterialTest, YieldCurvatureIsWhereTheOutermostFibreYields) {
+    ShellMaterial m;
+    m.young = 2e11;
+    m.poisson = 0.3;
+    m.thickness = 1e-3;
+    EXPECT_TRUE(std::isinf(m.yieldCurvature()));  // never yields
+    m.yieldStress = 2.5e8;
+    EXPECT_NEAR(m.yieldCurvature(), 2.0 * 2.5e8 * (1.0 - 0.09) / (2e11 * 1e-3), 1e-12);
+    // twice as stiff in bending: the same moment, half the curvature
+    m.bendingStiffnessOverride = 2.0 * m.bendingStiffness();
+    EXPECT_NEAR(m.yieldCurvature(), 2.5e8 * (1.0 - 0.09) / (2e11 * 1e-3), 1e-12);
+    m.bendingStiffnessOverride = 0.0;  // no moment, however far it is bent
+    EXPECT_TRUE(std::isinf(m.yieldCurvature()));
+}
+
+TEST(ShellMaterialTest, YieldAndHardeningAreChecked) {
+    ShellMaterial m;
+    m.yieldStress = 1e6;
+    m.hardening = 1e5;
+    EXPECT_EQ(complaint(m), "");
+    m.yieldStress = 0.0;
+    EXPECT_EQ(complaint(m), "ShellMaterial.yieldStress [Pa] must be > 0, got 0");
+    m.yieldStress = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(complaint(m), "ShellMaterial.yieldStress [Pa] must be finite, got inf");
+    EXPECT_EQ(complaint(with(&ShellMaterial::hardening, -1.0)), "ShellMaterial.hardening [Pa] must be >= 0, got -1");
+}
+
+TEST(ShellMaterialTest, OrthotropyMustBePositiveDefinite) {
+    const auto orthotropic = [](double weft, double shear, const Vec3& warp = Vec3(1, 0, 0)) {
+        ShellMaterial m;  // E_1 = 10 MPa
+        m.poisson = 0.4;
+        m.orthotropy = ShellMaterial::Orthotropy{weft, shear, warp};
+        return m;
+    };
+    EXPECT_EQ(complaint(orthotropic(6.2e7, 1e5)), "");
+    EXPECT_EQ(complaint(orthotropic(6.3e7, 1e5)),
+              "ShellMaterial.orthotropy.weftYoung [Pa] must be < E_1 / nu_12^2 = 6.25e+07 (positive definite "
+              "stiffness), got 6.3e+07");
+    EXPECT_EQ(complaint(orthotropic(0.0, 1e5)), "ShellMaterial.orthotropy.weftYoung [Pa] must be > 0, got 0");
+    EXPECT_EQ(complaint(orthotropic(1e7, -3.0)), "ShellMaterial.orthotropy.shear [Pa] must be > 0, got -3");
+    EXPECT_EQ(complaint(orthotropic(1e7, 1e6, Vec3::Zero())),
+              "ShellMaterial.orthotropy.warpDirection's length [-] must be > 0, got 0");
+    ShellMaterial halved = orthotropic(6.2e7, 1e5);
+    halved.stretchStiffnessOverride = 0.5 * halved.stretchStiffness();  // what counts is E_1 t
+    EXPECT_NE(complaint(halved), "");
+    ShellMaterial uncoupled = orthotropic(1e12, 1e5);
+    uncoupled.poisson = 0.0;
+    EXPECT_EQ(complaint(uncoupled), "");
+}
+
 TEST(ShellMaterialTest, NotANumberAndInfinityAreRefused) {
     const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
     EXPECT_EQ(complaint(with(&ShellMaterial::young, nan)), "ShellMaterial.young [Pa] must be > 0, got nan");
