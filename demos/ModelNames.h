@@ -36,6 +36,10 @@ template <class Model, class Visit>
 void forEachParameter(Model& model, Visit&& visit) {
     if constexpr (requires { model.stretchStiffness; })
         visit("stretch_stiffness", model.stretchStiffness, Range::nonNegative("N/m"));
+    if constexpr (requires { model.weftStiffness; })
+        visit("weft_stiffness", model.weftStiffness, Range::nonNegative("N/m"));
+    if constexpr (requires { model.shearStiffness; })
+        visit("shear_stiffness", model.shearStiffness, Range::nonNegative("N/m"));
     if constexpr (requires { model.stretchU; }) visit("stretch_u", model.stretchU, Range::nonNegative("N/m"));
     if constexpr (requires { model.stretchV; }) visit("stretch_v", model.stretchV, Range::nonNegative("N/m"));
     if constexpr (requires { model.shear; }) visit("shear", model.shear, Range::nonNegative("N/m"));
@@ -58,7 +62,7 @@ void readParameters(ObjectReader& in, Model& model) {
         if (!in.has(key)) return;
         if constexpr (std::is_same_v<Member, bool>)
             member = in.flag(key, member);
-        else if constexpr (std::is_same_v<Member, Vec3>)
+        else if constexpr (std::is_same_v<Member, std::optional<Vec3>>)
             member = in.vector(key);
         else
             member = in.number(key, range);
@@ -75,8 +79,8 @@ Json modelToJson(const Variant& variant) {
                 using Member = std::remove_cvref_t<decltype(member)>;
                 if constexpr (std::is_same_v<Member, std::optional<double>>) {
                     if (member) json[std::string(key)] = *member;
-                } else if constexpr (std::is_same_v<Member, Vec3>) {
-                    json[std::string(key)] = toJson(member);
+                } else if constexpr (std::is_same_v<Member, std::optional<Vec3>>) {
+                    if (member) json[std::string(key)] = toJson(*member);
                 } else {
                     json[std::string(key)] = member;
                 }

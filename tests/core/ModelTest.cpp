@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <limits>
 #include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <variant>
 #include <vector>
@@ -28,6 +29,17 @@ template <class Model>
 std::vector<Model> examples() {
     return {Model{}.fittedTo(exampleMaterial())};
 }
+ShellMaterial exampleWeave() {
+    ShellMaterial material = exampleMaterial();
+    material.orthotropy = {.weftYoung = 400.0, .shear = 60.0, .warpDirection = Vec3(0.3, -1.0, 2.0)};
+    return material;
+}
+template <>
+std::vector<StVenantKirchhoffMembrane> examples() {
+    return {StVenantKirchhoffMembrane{}.fittedTo(exampleMaterial()),
+            StVenantKirchhoffMembrane{}.fittedTo(exampleWeave()),  // and stiff in shear, where what warp and weft add
+            StVenantKirchhoffMembrane{.shearStiffness = 20.0}.fittedTo(exampleWeave())};  // to the rest is negative
+}
 template <>
 std::vector<BaraffWitkinMembrane> examples() {
     std::vector<BaraffWitkinMembrane> models(4);
@@ -36,6 +48,7 @@ std::vector<BaraffWitkinMembrane> examples() {
     models[3].areaSquared = true;
     models[3].conditionDamping = 0.3;
     for (auto& model : models) model = model.fittedTo(exampleMaterial());
+    models.push_back(BaraffWitkinMembrane{}.fittedTo(exampleWeave()));
     return models;
 }
 template <>
@@ -388,6 +401,51 @@ TEST(ModelParametersTest, UnsetOnesComeFromTheMaterialAndSetOnesStay) {
     EXPECT_THROW(DihedralBending{-1.0}.fittedTo(material), std::invalid_argument);
     EXPECT_THROW((StVenantKirchhoffMembrane{.poisson = 0.7}.fittedTo(material)), std::invalid_argument);
     EXPECT_THROW(BaraffWitkinMembrane{.bU = 0.0}.fittedTo(material), std::invalid_argument);
+}
+
+TEST(ModelParametersTest, AnOrthotropicMaterialsComeByDirection) {
+    const ShellMaterial weave = exampleWeave();
+    const auto stvk = StVenantKirchhoffMembrane{}.fittedTo(weave);
+    EXPECT_DOUBLE_EQ(*stvk.stretchStiffness, 10.0);
+    EXPECT_DOUBLE_EQ(*stvk.weftStiffness, 4.0);
+    EXPECT_DOUBLE_EQ(*stvk.shearStiffness, 0.6);
+    EXPECT_EQ(*stvk.warp, Vec3(0.3, -1.0, 2.0));
+    EXPECT_DOUBLE_EQ(*StVenantKirchhoffMembrane{.weftStiffness = 7.0}.fittedTo(weave).weftStiffness, 7.0);
+    const auto cloth = BaraffWitkinMembrane{}.fittedTo(weave);
+    EXPECT_DOUBLE_EQ(*cloth.stretchU, 10.0);
+    EXPECT_DOUBLE_EQ(*cloth.stretchV, 4.0);
+    EXPECT_DOUBLE_EQ(*cloth.shear, 0.6);
+    EXPECT_EQ(*cloth.warp, Vec3(0.3, -1.0, 2.0));
+    EXPECT_EQ(*BaraffWitkinMembrane{.warp = Vec3::UnitY()}.fittedTo(weave).warp, Vec3::UnitY());
+    // 0.3^2 x 120 > 10: warp and weft together could release energy
+    EXPECT_THROW(StVenantKirchhoffMembrane{.weftStiffness = 120.0}.fittedTo(weave), std::invalid_argument);
+    EXPECT_THROW((StVenantKirchhoffMembrane{.weftStiffness = 1.0, .warp = Vec3(0, 0, 0)}.fittedTo(exampleMaterial())),
+                 std::invalid_argument);
+}
+
+TEST(ModelParametersTest, AWarpNormalToATriangleIsRefused) {
+    ShellMaterial weave = exampleWeave();
+    weave.orthotropy->warpDirection = Vec3(0, 0, 2);
+    Stencil<3> X;
+    X << 0, 1, 0, 0, 0, 1, 5, 5, 5;  // in the plane z = 5
+    const auto complaint = [&](const auto& model) -> std::string {
+        try {
+            model.fittedTo(weave).rest(X, 0.5);
+        } catch (const std::invalid_argument& error) {
+            return error.what();
+        }
+        return "";
+    };
+    EXPECT_EQ(complaint(StVenantKirchhoffMembrane{}),
+              "StVenantKirchhoffMembrane: warp direction (0 0 2) is normal to a rest triangle, at (0 0 5)");
+    EXPECT_EQ(complaint(BaraffWitkinMembrane{}),
+              "BaraffWitkinMembrane: warp direction (0 0 2) is normal to a rest triangle, at (0 0 5)");
+    weave.orthotropy.reset();  // nobody said where the warp is: any direction will do
+    EXPECT_EQ(complaint(BaraffWitkinMembrane{}), "");
+    Stencil<3> facingX = X;
+    facingX.row(0) = X.row(2);
+    facingX.row(2) = X.row(0);
+    EXPECT_NO_THROW(BaraffWitkinMembrane{}.fittedTo(weave).rest(facingX, 0.5));
 }
 
 }  // namespace

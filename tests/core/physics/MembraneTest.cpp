@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -72,8 +73,9 @@ double energyOf(const Model& model, const Mat2& F, const TriangleMesh& mesh) {
 /// Energy per rest area [J/m^2] under x = F X: what a wider sheet stores more than a narrower one, so that the halved
 /// triangles at the ends of an equilateral mesh do not count.
 template <class Model>
-double density(Model model, const Mat2& F, GridDiagonals diagonals = GridDiagonals::Right) {
-    model = model.fittedTo(sheetMaterial());
+double density(Model model, const Mat2& F, GridDiagonals diagonals = GridDiagonals::Right,
+               const ShellMaterial& material = sheetMaterial()) {
+    model = model.fittedTo(material);
     const TriangleMesh wide = sheet(diagonals, 8), narrow = sheet(diagonals, 4);
     double area = 0.0;
     for (int t = 0; t < wide.triangles.cols(); ++t) area += areaOf(wide, t);
@@ -124,6 +126,83 @@ TEST(StVenantKirchhoffSheetTest, EvenStretchHasTheBiaxialModulus) {
     for (const double e : {-0.1, 0.1})
         EXPECT_NEAR(density(StVenantKirchhoffMembrane{}, stretched(factorOf(e), factorOf(e))),
                     kStretch / (1.0 - 0.3) * e * e, 1e-9 * kStretch);
+}
+
+constexpr double kWeft = 300.0, kShear = 50.0;  // E_2 t, G t [N/m]
+
+ShellMaterial weave(double warpDirection = 0.0) {
+    ShellMaterial material = sheetMaterial();
+    material.orthotropy = {.weftYoung = kWeft / material.thickness,
+                           .shear = kShear / material.thickness,  // the part normal to the sheet does not count
+                           .warpDirection = Vec3(std::cos(warpDirection), std::sin(warpDirection), 0.7)};
+    return material;
+}
+
+/// x = F X with Green strain (e_11, e_22, e_12) in the frame that is turned by `direction`.
+Mat2 strained(const Vec3& e, double direction) {
+    Mat2 turn, C;
+    turn << std::cos(direction), -std::sin(direction), std::sin(direction), std::cos(direction);
+    C << 1.0 + 2.0 * e(0), 2.0 * e(2), 2.0 * e(2), 1.0 + 2.0 * e(1);
+    const Eigen::SelfAdjointEigenSolver<Mat2> eigen(turn * C * turn.transpose());
+    return eigen.operatorSqrt();
+}
+
+/// Strain of a weave under the stress s [N/m], both in the frame of warp and weft.
+Vec3 strainOf(const Vec3& s) {
+    return {s(0) / kStretch - 0.3 / kStretch * s(1), s(1) / kWeft - 0.3 / kStretch * s(0), s(2) / (2.0 * kShear)};
+}
+
+TEST(OrthotropicSheetTest, PulledStripHasTheModulusOfItsDirection) {
+    const double bias = 4.0 / (1.0 / kStretch + 1.0 / kWeft + 1.0 / kShear - 2.0 * 0.3 / kStretch);  // E_45 t
+    for (const double warp : {0.0, 0.4, 1.9})
+        for (const double stress : {-20.0, 3.0, 20.0}) {  // all other stresses are zero
+            const auto stored = [&](const Vec3& s) {
+                return density(StVenantKirchhoffMembrane{}, strained(strainOf(s), warp), GridDiagonals::Right,
+                               weave(warp));
+            };
+            const double work = 0.5 * stress * stress;
+            EXPECT_NEAR(stored({stress, 0.0, 0.0}), work / kStretch, 1e-9);
+            EXPECT_NEAR(stored({0.0, stress, 0.0}), work / kWeft, 1e-9);
+            EXPECT_NEAR(stored(0.5 * stress * Vec3(1.0, 1.0, 1.0)), work / bias, 1e-9);
+            EXPECT_NEAR(stored({0.0, 0.0, stress}), work / kShear, 1e-9);
+        }
+}
+
+TEST(OrthotropicSheetTest, ContractsTheWeftByPoissonsRatioWhenTheWarpIsPulled) {
+    const double e = 0.05;
+    const auto stored = [&](double across) {
+        return density(StVenantKirchhoffMembrane{}, strained({e, across, 0.0}, 0.4), GridDiagonals::Right, weave(0.4));
+    };
+    EXPECT_LT(stored(-0.3 * e), stored(-0.29 * e));
+    EXPECT_LT(stored(-0.3 * e), stored(-0.31 * e));
+}
+
+TEST(OrthotropicSheetTest, EveryMeshStoresTheSame) {
+    const Mat2 F = strained({0.04, -0.03, 0.05}, 0.7);
+    const double expected = density(StVenantKirchhoffMembrane{}, F, GridDiagonals::Right, weave(1.2));
+    for (const auto diagonals : {GridDiagonals::Alternating, GridDiagonals::Equilateral})
+        EXPECT_NEAR(density(StVenantKirchhoffMembrane{}, F, diagonals, weave(1.2)), expected, 1e-9);
+}
+
+TEST(OrthotropicSheetTest, WithTheModuliOfAnIsotropicOneIsOne) {
+    ShellMaterial material = sheetMaterial();
+    material.orthotropy = {.weftYoung = material.young, .shear = material.young / 2.6, .warpDirection = Vec3(1, 2, 0)};
+    const Mat2 F = strained({0.2, -0.1, 0.15}, 0.3);
+    EXPECT_NEAR(density(StVenantKirchhoffMembrane{}, F, GridDiagonals::Right, material),
+                density(StVenantKirchhoffMembrane{}, F), 1e-9 * kStretch);
+}
+
+TEST(OrthotropicSheetTest, BaraffWitkinHasTheModuliAlongTheYarns) {
+    const double e = 0.1, angle = 0.2;
+    const auto stored = [&](const Mat2& F) {
+        return density(BaraffWitkinMembrane{}, F, GridDiagonals::Right, weave(0.6));
+    };
+    EXPECT_NEAR(stored(stretched(1.0 + e, 1.0, 0.6)), 0.5 * kStretch * e * e, 1e-9 * kStretch);
+    EXPECT_NEAR(stored(stretched(1.0, 1.0 + e, 0.6)), 0.5 * kWeft * e * e, 1e-9 * kStretch);
+    Mat2 turn, shear;  // yarns keep their lengths
+    turn << std::cos(0.6), -std::sin(0.6), std::sin(0.6), std::cos(0.6);
+    shear << 1.0, std::sin(angle), 0.0, std::cos(angle);
+    EXPECT_NEAR(stored(turn * shear * turn.transpose()), 0.5 * kShear * std::pow(std::sin(angle), 2), 1e-9 * kStretch);
 }
 
 TEST(BaraffWitkinSheetTest, PulledAlongTheYarnsHasYoungsModulus) {

@@ -17,7 +17,8 @@ namespace jacket {
 ///     E(x) = A/2 (k_u c_u^2 + k_v c_v^2 + k_s c_s^2)                                                          [J]
 ///
 /// Unset stiffnesses: k_u = k_v = E t, so that a strip pulled along warp or weft has the material's Young's modulus
-/// (nothing couples the two: the plate's factor 1 / (1 - nu^2) has no place), and k_s = G t = E t / (2 (1 + nu)).
+/// (nothing couples the two: the plate's factor 1 / (1 - nu^2) has no place), and k_s = G t = E t / (2 (1 + nu)). Of an
+/// orthotropic material E_1 t, E_2 t and its own G t.
 /// b_u, b_v other than 1 shrink or widen the cloth along warp and weft.
 ///
 /// Hessian:   Positive clamps the factor 1 - b/|w|, negative in compression, at zero and drops c_s times the second
@@ -29,13 +30,15 @@ namespace jacket {
 ///            |w| has w for the unit vector.
 struct BaraffWitkinMembrane {
     std::optional<double> stretchU{};  ///< k_u [N/m], >= 0; unset: E t
-    std::optional<double> stretchV{};  ///< k_v [N/m], >= 0; unset: E t
-    std::optional<double> shear{};     ///< k_s [N/m], >= 0; unset: E t / (2 (1 + nu)). Real weaves: some 10 .. 100 N/m
+    std::optional<double> stretchV{};  ///< k_v [N/m], >= 0; unset: E t, or the material's E_2 t
+    std::optional<double> shear{};     ///< k_s [N/m], >= 0; unset: E t / (2 (1 + nu)), or the material's G t. Real
+                                       ///< weaves: some 10 .. 100 N/m
     double bU = 1.0;                   ///< b_u [-], > 0
     double bV = 1.0;                   ///< b_v [-], > 0
     double conditionDamping = 0.0;     ///< k_d [N s/m], >= 0; with areaSquared [N s/m^3]
     bool areaSquared = false;          ///< weight A^2 as in the paper; the three stiffnesses are then in [N/m^3]
-    Vec3 warp{1.0, 0.0, 0.0};          ///< direction of u at rest, projected into each triangle's plane [-]
+    std::optional<Vec3> warp{};  ///< direction of u at rest, projected into every triangle [-]; unset: an orthotropic
+                                 ///< material's, else x, or y on triangles that face x
 
     static constexpr std::string_view kName = "baraff-witkin";
     static constexpr StencilSite kSite = StencilSite::Triangle;
@@ -48,30 +51,31 @@ struct BaraffWitkinMembrane {
 
     BaraffWitkinMembrane fittedTo(const ShellMaterial& material) const {
         BaraffWitkinMembrane model = *this;
-        const double k = material.stretchStiffness();
+        const double k = material.stretchStiffness(), t = material.thickness;
+        const auto& woven = material.orthotropy;
         model.stretchU = stiffnessOr(stretchU, k, "BaraffWitkinMembrane.stretchU [N/m]");
-        model.stretchV = stiffnessOr(stretchV, k, "BaraffWitkinMembrane.stretchV [N/m]");
-        model.shear = stiffnessOr(shear, k / (2.0 * (1.0 + material.poisson)), "BaraffWitkinMembrane.shear [N/m]");
+        model.stretchV = stiffnessOr(stretchV, woven ? woven->weftYoung * t : k, "BaraffWitkinMembrane.stretchV [N/m]");
+        model.shear = stiffnessOr(shear, woven ? woven->shear * t : k / (2.0 * (1.0 + material.poisson)),
+                                  "BaraffWitkinMembrane.shear [N/m]");
         requireParameter(bU > 0.0 && std::isfinite(bU), "BaraffWitkinMembrane.bU [-]", "> 0", bU);
         requireParameter(bV > 0.0 && std::isfinite(bV), "BaraffWitkinMembrane.bV [-]", "> 0", bV);
         requireParameter(conditionDamping >= 0.0 && std::isfinite(conditionDamping),
                          "BaraffWitkinMembrane.conditionDamping [N s/m]", ">= 0", conditionDamping);
-        const double length = warp.norm();
+        if (woven && !warp) model.warp = woven->warpDirection;
+        const double length = model.warp ? model.warp->norm() : 1.0;
         requireParameter(length > 0.0 && std::isfinite(length), "BaraffWitkinMembrane.warp's length [-]", "> 0",
                          length);
         return model;
     }
 
-    /// Where the warp direction is normal to the triangle, its coordinates shifted by one place (x to y) take its
-    /// place.
+    /// Throws std::invalid_argument if `warp` is set and normal to the triangle.
     template <class = void>
     Rest rest(const Stencil<3>& X, double area) const {
         requireTriangle(X.col(0), X.col(1), X.col(2), "BaraffWitkinMembrane");
-        const Vec3 normal = (X.col(1) - X.col(0)).cross(X.col(2) - X.col(0)).normalized();
-        const auto inPlane = [&](const Vec3& d) -> Vec3 { return d - d.dot(normal) * normal; };
-        Vec3 u = inPlane(warp.normalized());
-        if (u.norm() < 1e-3) u = inPlane(Vec3(warp.z(), warp.x(), warp.y()).normalized());
-        if (u.norm() < 1e-3) u = X.col(1) - X.col(0);  // warp (1,1,1) on a triangle that faces it
+        const Vec3 a = X.col(1) - X.col(0), b = X.col(2) - X.col(0);
+        const bool facesX = std::abs(a.cross(b).normalized().x()) > 1.0 - 1e-5;  // within 0.3 degrees
+        const Vec3 direction = warp.value_or(facesX ? Vec3::UnitY() : Vec3::UnitX());
+        const Vec3 u = projectedDirection(X, direction, "BaraffWitkinMembrane");
         return {.inverseFrame = inverseRestFrame(X, u), .weight = areaSquared ? area * area : area};
     }
 

@@ -7,13 +7,18 @@
 
 namespace jacket {
 
-/// Stretch and shear of one triangle of an isotropic sheet, with Poisson's contraction.
+/// Stretch and shear of one triangle of an isotropic or orthotropic sheet, with Poisson's contraction.
 ///
 ///          x2        F = [x1-x0  x2-x0] Dm^-1       deformation gradient, 3 x 2, Dm from the rest triangle    [-]
 ///         /  \       e = 1/2 (F^T F - I)            Green strain                                              [-]
 ///       x0 -- x1     S = c ((1 - nu) e + nu tr(e) I)  second Piola-Kirchhoff stress times thickness           [N/m]
 ///                    c = E t / (1 - nu^2)
 ///     E(x) = A/2 S : e = A c/2 ((1 - nu) e:e + nu (tr e)^2)                                                   [J]
+///
+/// Orthotropic (weftStiffness and shearStiffness set): e in the frame of warp 1 and weft 2, and
+///     S_11 = c (e_11 + nu_21 e_22),  S_22 = c (nu_21 e_11 + E_2/E_1 e_22),  S_12 = 2 G t e_12                [N/m]
+///     nu_21 = nu E_2/E_1,  c = E_1 t / (1 - nu nu_21)
+/// computed as an isotropic law with this shear and this coupling, plus a stiffness of warp and weft along themselves.
 ///
 /// Hessian:  Positive is the material part plus the geometric part with S clamped to its positive semi-definite part;
 ///           exact wherever S has no compression, at rest in particular.
@@ -22,17 +27,22 @@ namespace jacket {
 /// Source:   plane-stress St. Venant-Kirchhoff law, e.g. Bonet and Wood, Nonlinear Continuum Mechanics for Finite
 ///           Element Analysis, 2nd ed. 2008, ch. 6.
 struct StVenantKirchhoffMembrane {
-    std::optional<double> stretchStiffness{};  ///< E t [N/m], >= 0; unset: the material's
-    std::optional<double> poisson{};           ///< nu [-], -1 < nu <= 0.5; unset: the material's
+    std::optional<double> stretchStiffness{};  ///< E t, of warp if orthotropic [N/m], >= 0; unset: the material's
+    std::optional<double> poisson{};           ///< nu (nu_12) [-], -1 < nu <= 0.5; unset: the material's
+    std::optional<double> weftStiffness{};   ///< E_2 t [N/m], >= 0, nu^2 E_2 < E_1; unset: the material's, or isotropic
+    std::optional<double> shearStiffness{};  ///< G t [N/m], >= 0; unset: the material's, or isotropic
+    std::optional<Vec3> warp{};  ///< direction 1 at rest, projected into every triangle; unset: the material's, or x
 
     static constexpr std::string_view kName = "stvk";
     static constexpr StencilSite kSite = StencilSite::Triangle;
     static constexpr int kVertices = 3;
 
     struct Rest {
-        Mat2 inverseFrame;  ///< Dm^-1, rows g1 and g2 [1/m]
-        double shear;       ///< A c (1 - nu) [N m]
-        double dilation;    ///< A c nu [N m]
+        Mat2 inverseFrame;  ///< Dm^-1, rows g1 and g2, columns 1 and 2 [1/m]
+        double shear;       ///< A c (1 - nu), or 2 A G t [N m]
+        double dilation;    ///< A c nu, or A c nu_21 [N m]
+        double warp = 0.0;  ///< what warp adds to these along itself; 0 in an isotropic sheet [N m]
+        double weft = 0.0;  ///< and weft [N m]
     };
 
     StVenantKirchhoffMembrane fittedTo(const ShellMaterial& material) const {
@@ -40,16 +50,37 @@ struct StVenantKirchhoffMembrane {
                                      "StVenantKirchhoffMembrane.stretchStiffness [N/m]");
         const double nu = poisson.value_or(material.poisson);
         requireParameter(nu > -1.0 && nu <= 0.5, "StVenantKirchhoffMembrane.poisson [-]", "> -1 and <= 0.5", nu);
-        return {.stretchStiffness = k, .poisson = nu};
+        StVenantKirchhoffMembrane model = *this;
+        model.stretchStiffness = k;
+        model.poisson = nu;
+        if (material.orthotropy) {
+            if (!warp) model.warp = material.orthotropy->warpDirection;
+            if (!weftStiffness) model.weftStiffness = material.orthotropy->weftYoung * material.thickness;
+            if (!shearStiffness) model.shearStiffness = material.orthotropy->shear * material.thickness;
+        }
+        if (model.weftStiffness || model.shearStiffness) model.completeOrthotropy();
+        return model;
     }
 
+    /// Throws std::invalid_argument if the sheet is orthotropic and `warp` normal to the triangle.
     template <class = void>
     Rest rest(const Stencil<3>& X, double area) const {
         requireTriangle(X.col(0), X.col(1), X.col(2), "StVenantKirchhoffMembrane");
-        const double nu = poisson.value(), weight = area * stretchStiffness.value() / (1.0 - nu * nu);
-        return {.inverseFrame = inverseRestFrame(X, X.col(1) - X.col(0)),
-                .shear = weight * (1.0 - nu),
-                .dilation = weight * nu};
+        const double nu = poisson.value(), k = stretchStiffness.value();
+        if (!weftStiffness) {
+            const double weight = area * k / (1.0 - nu * nu);
+            return {.inverseFrame = inverseRestFrame(X, X.col(1) - X.col(0)),
+                    .shear = weight * (1.0 - nu),
+                    .dilation = weight * nu};
+        }
+        const double ratio = k > 0.0 ? *weftStiffness / k : 0.0;  // E_2 / E_1
+        const double weight = area / (1.0 - nu * nu * ratio);     // A c / (E_1 t)
+        const double shear = 2.0 * area * shearStiffness.value(), coupling = weight * nu * ratio * k;
+        return {.inverseFrame = inverseRestFrame(X, projectedDirection(X, warp.value(), "StVenantKirchhoffMembrane")),
+                .shear = shear,
+                .dilation = coupling,
+                .warp = weight * k - coupling - shear,
+                .weft = weight * *weftStiffness - coupling - shear};
     }
 
     template <class = void>
@@ -58,7 +89,11 @@ struct StVenantKirchhoffMembrane {
         const Vec3 a = x.col(1) - x.col(0), b = x.col(2) - x.col(0);
         const Eigen::Matrix<double, 3, 2> F = a * g1 + b * g2;
         const Mat2 e = 0.5 * (F.transpose() * F - Mat2::Identity());
-        const Mat2 S = r.shear * e + r.dilation * e.trace() * Mat2::Identity();  // times A
+        Mat2 S = r.shear * e + r.dilation * e.trace() * Mat2::Identity();  // times A
+        if (weftStiffness) {
+            S(0, 0) += r.warp * e(0, 0);
+            S(1, 1) += r.weft * e(1, 1);
+        }
 
         StencilEval<3> result;
         result.energy = 0.5 * S.cwiseProduct(e).sum();
@@ -69,14 +104,21 @@ struct StVenantKirchhoffMembrane {
 
         // the derivative of F S g_i by x_j, with a_i = F g_i:
         // (g_i . S g_j) I + shear / 2 ((g_i . g_j) F F^T + a_j a_i^T) + dilation a_i a_j^T
+        // + warp g_i1 g_j1 F_1 F_1^T + weft g_i2 g_j2 F_2 F_2^T, of the columns of F
         const Mat2 geometric = kind == HessianKind::Exact ? S : positivePart(S);
         const Mat3 FFt = (0.5 * r.shear) * (F * F.transpose());
         const Vec3 a1 = F * g1.transpose(), a2 = F * g2.transpose();
+        Mat3 alongWarp, alongWeft;
+        if (weftStiffness) {
+            alongWarp = r.warp * F.col(0) * F.col(0).transpose();
+            alongWeft = r.weft * F.col(1) * F.col(1).transpose();
+        }
         const auto block = [&](const Eigen::RowVector2d& gi, const Eigen::RowVector2d& gj, const Vec3& ai,
                                const Vec3& aj) {
             const Vec3 shearAi = (0.5 * r.shear) * ai, dilationAi = r.dilation * ai;
             Mat3 m = gi.dot(gj) * FFt + aj * shearAi.transpose() + dilationAi * aj.transpose();
             m.diagonal().array() += gi.dot(gj * geometric);  // S is symmetric
+            if (weftStiffness) m += alongWarp * (gi(0) * gj(0)) + alongWeft * (gi(1) * gj(1));
             return m;
         };
         setTriangleMatrix(result.hessian, block(g1, g1, a1, a1), block(g1, g2, a1, a2), block(g2, g2, a2, a2));
@@ -84,6 +126,21 @@ struct StVenantKirchhoffMembrane {
     }
 
   private:
+    /// Fills what of weft and shear is still unset as in the isotropic sheet, and checks all of it.
+    void completeOrthotropy() {
+        const double k = *stretchStiffness, nu = *poisson;
+        weftStiffness = stiffnessOr(weftStiffness, k, "StVenantKirchhoffMembrane.weftStiffness [N/m]");
+        shearStiffness =
+            stiffnessOr(shearStiffness, k / (2.0 * (1.0 + nu)), "StVenantKirchhoffMembrane.shearStiffness [N/m]");
+        requireParameter(nu == 0.0 || nu * nu * *weftStiffness < k || *weftStiffness == 0.0,
+                         "StVenantKirchhoffMembrane.weftStiffness [N/m]",
+                         "< E_1 t / nu_12^2 (positive definite stiffness)", *weftStiffness);
+        if (!warp) warp = Vec3::UnitX();
+        const double length = warp->norm();
+        requireParameter(length > 0.0 && std::isfinite(length), "StVenantKirchhoffMembrane.warp's length [-]", "> 0",
+                         length);
+    }
+
     /// Nearest positive semi-definite matrix to a symmetric S, in closed form.
     template <class = void>
     static Mat2 positivePart(const Mat2& S) {

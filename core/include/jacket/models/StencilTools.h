@@ -63,6 +63,19 @@ Mat2 inverseRestFrame(const Stencil<3>& X, const Vec3& u) {
     return inverse / determinant;
 }
 
+/// The unit vector of `direction` projected into the plane of the rest triangle X. Throws std::invalid_argument if it
+/// is normal to the plane (within about 0.1 degrees), where no direction is meant.
+template <class = void>
+Vec3 projectedDirection(const Stencil<3>& X, const Vec3& direction, std::string_view model) {
+    const Vec3 normal = (X.col(1) - X.col(0)).cross(X.col(2) - X.col(0)).normalized(), d = direction.normalized();
+    const Vec3 inPlane = d - d.dot(normal) * normal;
+    if (inPlane.norm() >= 2e-3) return inPlane.normalized();
+    std::ostringstream message;
+    message << model << ": warp direction (" << direction.transpose() << ") is normal to a rest triangle, at ("
+            << X.col(0).transpose() << ")";
+    throw std::invalid_argument(message.str());
+}
+
 /// Cotangent of the angle at `apex` in the triangle (apex p q).
 template <class = void>
 double cotangent(const Vec3& apex, const Vec3& p, const Vec3& q) {
