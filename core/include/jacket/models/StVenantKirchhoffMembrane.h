@@ -108,20 +108,22 @@ struct StVenantKirchhoffMembrane {
         const Mat2 geometric = kind == HessianKind::Exact ? S : positivePart(S);
         const Mat3 FFt = (0.5 * r.shear) * (F * F.transpose());
         const Vec3 a1 = F * g1.transpose(), a2 = F * g2.transpose();
-        Mat3 alongWarp, alongWeft;
-        if (weftStiffness) {
-            alongWarp = r.warp * F.col(0) * F.col(0).transpose();
-            alongWeft = r.weft * F.col(1) * F.col(1).transpose();
-        }
         const auto block = [&](const Eigen::RowVector2d& gi, const Eigen::RowVector2d& gj, const Vec3& ai,
                                const Vec3& aj) {
             const Vec3 shearAi = (0.5 * r.shear) * ai, dilationAi = r.dilation * ai;
             Mat3 m = gi.dot(gj) * FFt + aj * shearAi.transpose() + dilationAi * aj.transpose();
             m.diagonal().array() += gi.dot(gj * geometric);  // S is symmetric
-            if (weftStiffness) m += alongWarp * (gi(0) * gj(0)) + alongWeft * (gi(1) * gj(1));
             return m;
         };
-        setTriangleMatrix(result.hessian, block(g1, g1, a1, a1), block(g1, g2, a1, a2), block(g2, g2, a2, a2));
+        Mat3 m11 = block(g1, g1, a1, a1), m12 = block(g1, g2, a1, a2), m22 = block(g2, g2, a2, a2);
+        if (weftStiffness) {
+            const Mat3 alongWarp = r.warp * F.col(0) * F.col(0).transpose();
+            const Mat3 alongWeft = r.weft * F.col(1) * F.col(1).transpose();
+            m11 += g1(0) * g1(0) * alongWarp + g1(1) * g1(1) * alongWeft;
+            m12 += g1(0) * g2(0) * alongWarp + g1(1) * g2(1) * alongWeft;
+            m22 += g2(0) * g2(0) * alongWarp + g2(1) * g2(1) * alongWeft;
+        }
+        setTriangleMatrix(result.hessian, m11, m12, m22);
         return result;
     }
 
