@@ -170,7 +170,7 @@ void readMaterial(ObjectReader& in, ShellDescription& shell) {
     if (value.is_string()) {
         shell.preset = value.get<std::string>();
         const auto& preset = findPreset(shell.preset, in.label("material"));
-        shell.material = preset.make(preset.usualThickness);
+        shell.material = preset.make(preset.usual.thickness);
         return;
     }
     ObjectReader fields = in.object("material");
@@ -179,7 +179,7 @@ void readMaterial(ObjectReader& in, ShellDescription& shell) {
     std::optional<ShellMaterial> start;
     if (!shell.preset.empty()) {
         const auto& preset = findPreset(shell.preset, fields.label("preset"));
-        start = preset.make(fields.number("thickness", Range::positive("m"), preset.usualThickness));
+        start = preset.make(fields.number("thickness", Range::positive("m"), preset.usual.thickness));
     }
     shell.material = readMaterialFields(fields, start);
 }

@@ -80,16 +80,7 @@ void validate(const ShellMaterial& m) {
 namespace materials {
 namespace {
 
-ShellMaterial solid(double young, double poisson, double density, double thickness) {
-    ShellMaterial m;
-    m.young = young;
-    m.poisson = poisson;
-    m.thickness = thickness;
-    m.density = density;
-    return m;
-}
-
-struct FabricData {
+struct Fabric {
     double thickness;         ///< under a light load [m]
     double areaDensity;       ///< [kg/m^2]
     double stretchStiffness;  ///< E t [N/m], mean slope up to about 500 N/m, warp and weft averaged
@@ -97,46 +88,100 @@ struct FabricData {
 };
 
 /// Young's modulus and density are set to agree with the measured values; Poisson's ratio is roughly a plain weave's.
-ShellMaterial fabric(const FabricData& data, double thickness) {
-    ShellMaterial m = solid(data.stretchStiffness / thickness, 0.2, data.areaDensity / thickness, thickness);
-    m.stretchStiffnessOverride = data.stretchStiffness;
-    m.bendingStiffnessOverride = data.bendingStiffness;
-    m.areaDensityOverride = data.areaDensity;
+/// Isotropic, so that a sheet of any shape may be cut from it. Real weaves shear far more easily: denim has a G t of 85
+/// to 190 N/m (1.5 to 3.4 gf/cm per degree, Journal of Textiles 2016, 4614168), which `orthotropy` can say once the
+/// direction of the warp is known.
+ShellMaterial measured(const Fabric& fabric) {
+    ShellMaterial m{.young = fabric.stretchStiffness / fabric.thickness,
+                    .poisson = 0.2,
+                    .thickness = fabric.thickness,
+                    .density = fabric.areaDensity / fabric.thickness};
+    m.stretchStiffnessOverride = fabric.stretchStiffness;
+    m.bendingStiffnessOverride = fabric.bendingStiffness;
+    m.areaDensityOverride = fabric.areaDensity;
     return m;
 }
 
 // Order of magnitude and range after the KES-F figures of apparel fabrics: extension at 500 gf/cm (490 N/m), bending
 // rigidity B, weight W.
-constexpr FabricData kCotton{0.4e-3, 0.12, 1.0e4, 5e-6};  // shirting: 5 %, B 0.05 gf cm^2/cm, W 120 g/m^2
-constexpr FabricData kDenim{0.9e-3, 0.40, 1.5e4, 5e-5};   // 12 oz: 3 %, B 0.5 gf cm^2/cm, W 400 g/m^2
-constexpr FabricData kSilk{0.2e-3, 0.07, 1.0e4, 2e-6};    // dress silk: 5 %, B 0.02 gf cm^2/cm, W 70 g/m^2
-
 constexpr std::string_view kFabricSource =
     "typical of the KES-F ranges in Kawabata, The Standardization and Analysis of Hand Evaluation, 2nd ed. 1980, and "
-    "Hu, "
-    "Structure and Mechanics of Woven Fabrics, 2004";
-constexpr std::string_view kAshbySource =
-    "within the ranges of Ashby, Materials Selection in Mechanical Design, appendix A";
-constexpr std::string_view kMetalSource =
-    "Gere and Goodno, Mechanics of Materials, appendix on properties of materials";
+    "Hu, Structure and Mechanics of Woven Fabrics, 2004";
 
-constexpr std::array<Preset, 11> kPresets{{
-    {"cotton", kCotton.thickness, [](double t) { return fabric(kCotton, t); }, kFabricSource},
-    {"denim", kDenim.thickness, [](double t) { return fabric(kDenim, t); }, kFabricSource},
-    {"silk", kSilk.thickness, [](double t) { return fabric(kSilk, t); }, kFabricSource},
-    {"leather", 1.5e-3, leather, kAshbySource},
-    {"paper", 1e-4, paper,
-     "office paper of 80 g/m^2; modulus between the two directions of machine-made sheets, "
-     "Niskanen (ed.), Paper Physics, 2nd ed. 2008"},
-    {"cardboard", 5e-4, cardboard, kAshbySource},
-    {"rubber", 1e-3, rubber,
-     "natural rubber, small strains; within the ranges of Ashby, Materials Selection in "
-     "Mechanical Design, appendix A"},
-    {"aluminium", 1e-3, aluminium, kMetalSource},
-    {"steel", 1e-3, steel, kMetalSource},
-    {"copper", 1e-3, copper, kMetalSource},
-    {"PET", 1e-4, pet, kAshbySource},
-}};
+// Hardening is the mean slope of true stress over plastic strain, from yield to the tensile strength R_m at the strain
+// there: (R_m exp(e) - sigma_y) / e. A sheet bent by a few per cent hardens faster than that at first.
+const std::array<Preset, 11>& table() {
+    static const std::array<Preset, 11> presets{{
+        // shirting: 5 %, B 0.05 gf cm^2/cm, 120 g/m^2
+        {"cotton", measured({0.4e-3, 0.12, 1.0e4, 5e-6}), kFabricSource},
+        // 12 oz: 3 %, B 0.5 gf cm^2/cm, 400 g/m^2
+        {"denim", measured({0.9e-3, 0.40, 1.5e4, 5e-5}), kFabricSource},
+        // dress silk: 5 %, B 0.02 gf cm^2/cm, 70 g/m^2
+        {"silk", measured({0.2e-3, 0.07, 1.0e4, 2e-6}), kFabricSource},
+        {"leather",
+         {.young = 0.15e9, .poisson = 0.4, .thickness = 1.5e-3, .density = 900.0},
+         "within the ranges of Ashby, Materials Selection in Mechanical Design, appendix A"},
+        {"paper",
+         {.young = 4e9,
+          .poisson = 0.3,
+          .thickness = 1e-4,
+          .density = 800.0,
+          .yieldStress = 15e6,  // leaves the line at a strain of about 0.4 %
+          .hardening = 0.8e9},  // some 32 MPa at a strain of 3 %
+         "office paper of 80 g/m^2; modulus, yield and hardening between the two directions of machine-made sheets, "
+         "Niskanen (ed.), Paper Physics, 2nd ed. 2008; yield and hardening are estimates"},
+        {"cardboard",
+         {.young = 3e9,
+          .poisson = 0.3,
+          .thickness = 5e-4,
+          .density = 700.0,
+          .yieldStress = 9e6,  // 12 MPa along the machine, 6.5 MPa across
+          .hardening = 1e9},
+         "solid board; within the ranges of Ashby, Materials Selection in Mechanical Design, appendix A; yield between "
+         "the two directions in Xia, Boyce and Parks, Int. J. Solids and Structures 39, 2002; hardening "
+         "estimated"},
+        {"rubber",
+         {.young = 2e6, .poisson = 0.5, .thickness = 1e-3, .density = 925.0},
+         "natural rubber, small strains; within the ranges of Ashby, Materials Selection in Mechanical Design, "
+         "appendix A"},
+        {"aluminium",
+         {.young = 70e9,
+          .poisson = 0.33,
+          .thickness = 1e-3,
+          .density = 2700.0,
+          .yieldStress = 193e6,
+          .hardening = 0.55e9},  // R_m 228 MPa, 12 % at break
+         "Gere and Goodno, Mechanics of Materials, appendix on properties of materials; yield and hardening of "
+         "5052-H32 sheet, ASM Aerospace Specification Metals (asm.matweb.com), typical"},
+        {"steel",
+         {.young = 200e9,
+          .poisson = 0.30,
+          .thickness = 1e-3,
+          .density = 7850.0,
+          .yieldStress = 180e6,
+          .hardening = 1.05e9},  // R_m 310 MPa, n = 0.18 the strain there
+         "Gere and Goodno, Mechanics of Materials, appendix on properties of materials; yield and hardening of "
+         "cold-rolled DC04, within EN 10130 (R_e at most 210 MPa, R_m 270 to 350 MPa, n at least 0.18)"},
+        {"copper",
+         {.young = 115e9,
+          .poisson = 0.34,
+          .thickness = 1e-3,
+          .density = 8900.0,
+          .yieldStress = 75e6,
+          .hardening = 0.64e9},  // R_m 220 MPa, 48 % at break
+         "Gere and Goodno, Mechanics of Materials, appendix on properties of materials; yield and hardening of "
+         "annealed C10800 (OS050), makeitfrom.com"},
+        {"PET",
+         {.young = 4.9e9,
+          .poisson = 0.38,
+          .thickness = 1e-4,
+          .density = 1390.0,
+          .yieldStress = 90e6,   // the line below, back to where it meets E: at 5 % the stress is 98 MPa
+          .hardening = 0.45e9},  // R_m 200 to 235 MPa, 116 to 91 % at break
+         "biaxially drawn film, DuPont Teijin Films, Mylar product information H-37232 (92A)"},
+    }};
+    return presets;
+}
 
 std::string lowerCase(std::string_view text) {
     std::string result(text);
@@ -160,53 +205,70 @@ std::size_t editDistance(std::string_view a, std::string_view b) {
     return row.back();
 }
 
+const Preset& find(std::string_view name) {
+    const std::string wanted = lowerCase(name);
+    const auto distance = [&](const Preset& preset) { return editDistance(wanted, lowerCase(preset.name)); };
+    const Preset& nearest = *std::ranges::min_element(table(), {}, distance);
+    if (distance(nearest) == 0) return nearest;
+    throw std::invalid_argument("unknown material \"" + std::string(name) + "\"; did you mean \"" +
+                                std::string(nearest.name) + "\"?");
+}
+
+ShellMaterial at(std::optional<double> thickness, std::string_view name) {
+    const Preset& preset = find(name);
+    return thickness ? preset.make(*thickness) : preset.usual;
+}
+
 }  // namespace
 
-ShellMaterial cotton() {
-    return fabric(kCotton, kCotton.thickness);
-}
-ShellMaterial denim() {
-    return fabric(kDenim, kDenim.thickness);
-}
-ShellMaterial silk() {
-    return fabric(kSilk, kSilk.thickness);
-}
-ShellMaterial leather(double thickness) {
-    return solid(0.15e9, 0.4, 900.0, thickness);
-}
-ShellMaterial paper(double thickness) {
-    return solid(4e9, 0.3, 800.0, thickness);
-}
-ShellMaterial cardboard(double thickness) {
-    return solid(3e9, 0.3, 700.0, thickness);
-}
-ShellMaterial rubber(double thickness) {
-    return solid(2e6, 0.5, 925.0, thickness);
-}
-ShellMaterial aluminium(double thickness) {
-    return solid(70e9, 0.33, 2700.0, thickness);
-}
-ShellMaterial steel(double thickness) {
-    return solid(200e9, 0.30, 7850.0, thickness);
-}
-ShellMaterial copper(double thickness) {
-    return solid(115e9, 0.34, 8900.0, thickness);
-}
-ShellMaterial pet(double thickness) {
-    return solid(3.5e9, 0.38, 1380.0, thickness);
+ShellMaterial Preset::make(double thickness) const {
+    ShellMaterial m = usual;
+    m.thickness = thickness;
+    if (m.stretchStiffnessOverride) m.young = *m.stretchStiffnessOverride / thickness;
+    if (m.areaDensityOverride) m.density = *m.areaDensityOverride / thickness;
+    return m;
 }
 
 std::span<const Preset> presets() {
-    return kPresets;
+    return table();
 }
 
 ShellMaterial byName(std::string_view name) {
-    const std::string wanted = lowerCase(name);
-    const auto distance = [&](const Preset& preset) { return editDistance(wanted, lowerCase(preset.name)); };
-    const Preset& nearest = *std::ranges::min_element(kPresets, {}, distance);
-    if (distance(nearest) == 0) return nearest.make(nearest.usualThickness);
-    throw std::invalid_argument("unknown material \"" + std::string(name) + "\"; did you mean \"" +
-                                std::string(nearest.name) + "\"?");
+    return find(name).usual;
+}
+
+ShellMaterial cotton() {
+    return byName("cotton");
+}
+ShellMaterial denim() {
+    return byName("denim");
+}
+ShellMaterial silk() {
+    return byName("silk");
+}
+ShellMaterial leather(std::optional<double> thickness) {
+    return at(thickness, "leather");
+}
+ShellMaterial paper(std::optional<double> thickness) {
+    return at(thickness, "paper");
+}
+ShellMaterial cardboard(std::optional<double> thickness) {
+    return at(thickness, "cardboard");
+}
+ShellMaterial rubber(std::optional<double> thickness) {
+    return at(thickness, "rubber");
+}
+ShellMaterial aluminium(double thickness) {
+    return at(thickness, "aluminium");
+}
+ShellMaterial steel(double thickness) {
+    return at(thickness, "steel");
+}
+ShellMaterial copper(double thickness) {
+    return at(thickness, "copper");
+}
+ShellMaterial pet(std::optional<double> thickness) {
+    return at(thickness, "PET");
 }
 
 }  // namespace materials

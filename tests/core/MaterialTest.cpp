@@ -153,12 +153,37 @@ TEST(MaterialPresetTest, AllAreValidAndFoundByTheirNames) {
     for (const auto& preset : materials::presets()) {
         const ShellMaterial m = materials::byName(preset.name);
         EXPECT_EQ(complaint(m), "") << preset.name;
-        EXPECT_EQ(m.thickness, preset.usualThickness) << preset.name;
+        EXPECT_EQ(m.thickness, preset.usual.thickness) << preset.name;
         EXPECT_EQ(preset.make(2e-3).thickness, 2e-3) << preset.name;
         EXPECT_FALSE(preset.source.empty()) << preset.name;
     }
     EXPECT_EQ(materials::byName("Steel").young, materials::steel(1e-3).young);
     EXPECT_EQ(materials::byName("pet").density, materials::pet().density);
+}
+
+TEST(MaterialPresetTest, ThinnerSheetsAreOfTheSameStuff) {
+    const ShellMaterial foil = materials::aluminium(2e-5), plate = materials::aluminium(4e-3);
+    EXPECT_EQ(foil.young, plate.young);
+    EXPECT_EQ(foil.yieldStress, plate.yieldStress);
+    EXPECT_EQ(foil.thickness, 2e-5);
+    EXPECT_EQ(materials::leather().thickness, 1.5e-3);
+    EXPECT_EQ(materials::leather(3e-3).thickness, 3e-3);
+}
+
+// Mild steel sheet of 1 mm stays bent when rolled to less than a radius of 0.6 m, paper to less than 15 mm.
+TEST(MaterialPresetTest, MetalsPaperAndPlasticYieldAndTheOthersDoNot) {
+    for (const char* name : {"aluminium", "steel", "copper", "PET", "paper", "cardboard"}) {
+        const ShellMaterial m = materials::byName(name);
+        ASSERT_TRUE(m.yieldStress) << name;
+        EXPECT_GT(*m.yieldStress / m.young, 1e-4) << name;  // strains of yield
+        EXPECT_LT(*m.yieldStress / m.young, 2e-2) << name;
+        EXPECT_GT(m.hardening, 0.0) << name;
+        EXPECT_LT(m.hardening, m.young) << name;
+    }
+    for (const char* name : {"cotton", "denim", "silk", "leather", "rubber"})
+        EXPECT_FALSE(materials::byName(name).yieldStress) << name;
+    EXPECT_NEAR(1.0 / materials::steel(1e-3).yieldCurvature(), 0.61, 0.01);
+    EXPECT_NEAR(1.0 / materials::paper().yieldCurvature(), 0.0147, 1e-4);
 }
 
 TEST(MaterialPresetTest, FabricsBendMoreEasilyThanASolidSheetWould) {

@@ -50,26 +50,29 @@ struct ShellMaterial {
 /// -0.001".
 void validate(const ShellMaterial& material);
 
-/// Textbook materials. `thickness` [m] is of the sheet; fabrics have a usual one.
+/// Textbook materials. `thickness` [m] is of the sheet; unset: the usual one. What has no yield stress has none that
+/// means something: rubber springs back until it tears, leather and woven cloth keep creases by fibres that slip.
 namespace materials {
 ShellMaterial cotton();
 ShellMaterial denim();
 ShellMaterial silk();
-ShellMaterial leather(double thickness = 1.5e-3);
-ShellMaterial paper(double thickness = 1e-4);
-ShellMaterial cardboard(double thickness = 5e-4);
-ShellMaterial rubber(double thickness = 1e-3);
+ShellMaterial leather(std::optional<double> thickness = {});
+ShellMaterial paper(std::optional<double> thickness = {});
+ShellMaterial cardboard(std::optional<double> thickness = {});
+ShellMaterial rubber(std::optional<double> thickness = {});
 ShellMaterial aluminium(double thickness);
 ShellMaterial steel(double thickness);
 ShellMaterial copper(double thickness);
-ShellMaterial pet(double thickness = 1e-4);
+ShellMaterial pet(std::optional<double> thickness = {});
 
-/// One line of the table of presets: `source` says where the figures come from.
+/// One line of the table of presets.
 struct Preset {
     std::string_view name;
-    double usualThickness;  ///< [m]
-    ShellMaterial (*make)(double thickness);
-    std::string_view source;
+    ShellMaterial usual;      ///< at its usual thickness
+    std::string_view source;  ///< where the figures come from
+
+    /// At another thickness [m]. What was measured of a fabric stays, and its modulus and density follow.
+    ShellMaterial make(double thickness) const;
 };
 std::span<const Preset> presets();
 ShellMaterial byName(
