@@ -38,18 +38,10 @@ constexpr std::array kShellKeys{"name",
 constexpr std::array kBodyKeys{
     "name", "shape", "mass", "position", "rotation_deg", "velocity", "angular_velocity", "friction", "kinematic"};
 constexpr std::array kProbeKeys{"name", "shell", "body", "box", "vertices", "quantity"};
-constexpr std::array kMaterialKeys{"preset",
-                                   "young",
-                                   "poisson",
-                                   "thickness",
-                                   "density",
-                                   "yield",
-                                   "hardening",
-                                   "stretch_stiffness",
-                                   "bending_stiffness",
-                                   "area_density",
-                                   "stiffness_damping",
-                                   "mass_damping"};
+constexpr std::array kMaterialKeys{
+    "preset",      "young",      "poisson",           "thickness",         "density",      "yield",
+    "hardening",   "orthotropy", "stretch_stiffness", "bending_stiffness", "area_density", "stiffness_damping",
+    "mass_damping"};
 
 /// Before anything else is said about an object: a misspelt key explains more than a missing one.
 void checkKeys(ObjectReader& in, std::span<const char* const> known) {
@@ -132,6 +124,26 @@ std::optional<double> readOverride(ObjectReader& in, std::string_view key, const
     return in.has(key) ? in.optionalNumber(key, range) : fallback;
 }
 
+ShellMaterial::Orthotropy readOrthotropy(ObjectReader in) {
+    static constexpr std::array kKeys{"weft_young", "shear", "warp"};
+    checkKeys(in, kKeys);
+    ShellMaterial::Orthotropy orthotropy;
+    orthotropy.weftYoung = in.number("weft_young", Range::positive("Pa"));
+    orthotropy.shear = in.number("shear", Range::positive("Pa"));
+    orthotropy.warpDirection = in.vector("warp", orthotropy.warpDirection);
+    if (!(orthotropy.warpDirection.norm() > 0)) in.fail("warp", "must be a direction, got [0, 0, 0]");
+    return orthotropy;
+}
+
+/// What no range of a single field says: no pair of stretches may release energy.
+void requirePositiveDefinite(ObjectReader& in, const ShellMaterial& m) {
+    try {
+        validate(m);
+    } catch (const std::invalid_argument& error) {
+        in.fail("orthotropy", std::string("must be positive definite: ") + error.what());
+    }
+}
+
 /// Fields on top of `material`. What nothing else determines must be given: `start` is a whole preset, or absent.
 ShellMaterial readMaterialFields(ObjectReader& in, const std::optional<ShellMaterial>& start) {
     ShellMaterial material = start.value_or(ShellMaterial{});
@@ -151,8 +163,12 @@ ShellMaterial readMaterialFields(ObjectReader& in, const std::optional<ShellMate
         readOverride(in, "area_density", Range::positive("kg/m^2"), material.areaDensityOverride);
     material.stiffnessDamping = in.number("stiffness_damping", Range::nonNegative("s"), material.stiffnessDamping);
     material.massDamping = in.number("mass_damping", Range::nonNegative("1/s"), material.massDamping);
-    in.notYet("yield", "plasticity");
-    in.notYet("hardening", "plasticity");
+    if (in.has("yield")) material.yieldStress = in.number("yield", Range::positive("Pa"));
+    material.hardening = in.number("hardening", Range::nonNegative("Pa"), material.hardening);
+    if (in.has("orthotropy")) {
+        material.orthotropy = readOrthotropy(in.object("orthotropy"));
+        requirePositiveDefinite(in, material);
+    }
     return material;
 }
 

@@ -51,6 +51,11 @@ Json toJson(const ShellMaterial& material) {
     if (material.stretchStiffnessOverride) json["stretch_stiffness"] = *material.stretchStiffnessOverride;
     if (material.bendingStiffnessOverride) json["bending_stiffness"] = *material.bendingStiffnessOverride;
     if (material.areaDensityOverride) json["area_density"] = *material.areaDensityOverride;
+    if (material.yieldStress) json["yield"] = *material.yieldStress;
+    if (material.hardening > 0) json["hardening"] = material.hardening;
+    if (const auto& weave = material.orthotropy)
+        json["orthotropy"] = {
+            {"weft_young", weave->weftYoung}, {"shear", weave->shear}, {"warp", demo::toJson(weave->warpDirection)}};
     json["stiffness_damping"] = material.stiffnessDamping;
     json["mass_damping"] = material.massDamping;
     return json;

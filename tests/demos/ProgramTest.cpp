@@ -88,7 +88,6 @@ TEST(Program, BadInputIsExitCode2WithOneMessageAndNothingWritten) {
         {{"run", scene, "--set", "probes.0.box=[[5,5,5],[6,6,6]]"}, "probes.0.box selects no vertex"},
         {{"run", scene, "--png", "0"}, "--png must be >= 1"},
         {{"run", scene, "--png", "1", "--size", "big"}, "--size must be WIDTHxHEIGHT"},
-        {{"run", "bowl_plastic"}, "plasticity is not available yet"},
     };
     for (auto [arguments, expected] : cases) {
         arguments.insert(arguments.end(), {"--out", out});
