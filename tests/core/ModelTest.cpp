@@ -417,6 +417,7 @@ TEST(ModelParametersTest, AnOrthotropicMaterialsComeByDirection) {
     EXPECT_DOUBLE_EQ(*cloth.shear, 0.6);
     EXPECT_EQ(*cloth.warp, Vec3(0.3, -1.0, 2.0));
     EXPECT_EQ(*BaraffWitkinMembrane{.warp = Vec3::UnitY()}.fittedTo(weave).warp, Vec3::UnitY());
+    EXPECT_THROW(SpringMembrane{}.fittedTo(weave), std::invalid_argument);
     // 0.3^2 x 120 > 10: warp and weft together could release energy
     EXPECT_THROW(StVenantKirchhoffMembrane{.weftStiffness = 120.0}.fittedTo(weave), std::invalid_argument);
     EXPECT_THROW((StVenantKirchhoffMembrane{.weftStiffness = 1.0, .warp = Vec3(0, 0, 0)}.fittedTo(exampleMaterial())),

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 
 #include "jacket/models/StencilModel.h"
 #include "jacket/models/StencilTools.h"
@@ -35,6 +36,8 @@ struct SpringMembrane {
     };
 
     SpringMembrane fittedTo(const ShellMaterial& material) const {
+        if (material.orthotropy)
+            throw std::invalid_argument("SpringMembrane is isotropic; an orthotropic material needs another membrane");
         return {.stretchStiffness =
                     stiffnessOr(stretchStiffness, material.stretchStiffness(), "SpringMembrane.stretchStiffness [N/m]"),
                 .compression = compression};
