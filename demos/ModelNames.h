@@ -26,7 +26,6 @@ Variant modelByName(const std::string& name, const std::string& label) {
         return ((Models::kName == name ? (result = Models{}, true) : false) || ...);
     }(static_cast<const Variant*>(nullptr));
     if (found) return result;
-    if (name == "patch") throw NotAvailable(label + ": patch bending is not available yet");
     const auto names = modelNames(static_cast<const Variant*>(nullptr));
     throw InputError(label + ": unknown model \"" + name + "\"" + suggestion(name, names));
 }

@@ -1,5 +1,6 @@
 #include "jacket/Island.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -28,6 +29,8 @@ struct IslandSolver::Impl {
     std::vector<int> offsets, dynamicIndex;
     std::vector<int> dynamicBodies;  ///< index in IslandInput.bodies of each dynamic body
     Points v, start, y;              ///< all shells
+    Points from;                     ///< velocities that the step's momentum starts from (BDF2: not `start`)
+    std::vector<double> stepOf;      ///< of each shell, as its integrator counts it [s]
     Points lastChange;               ///< dv of the last step
     Points expected;                 ///< velocities if that goes on: the warm start
     Points unfiltered;               ///< (b - A v) at the solution, soft rows included
@@ -35,8 +38,11 @@ struct IslandSolver::Impl {
     Eigen::Matrix<double, 6, Eigen::Dynamic> freeTwist;
 
     void gather(const IslandInput& input);
+    void beginTwoStep(const IslandInput& input, std::size_t shell);
     void assemble(const IslandInput& input, bool atEnd);
     bool overstretches(const IslandInput& input) const;
+    bool improves(const IslandInput& input, const Points& before);
+    double incrementalPotential(const IslandInput& input, const Points& velocities) const;
     void solveStep(const IslandInput& input, StepReport& report);
     double floorOfReference(const IslandInput& input) const;
     void solveRounds(const IslandInput& input, StepReport& report);
@@ -55,7 +61,7 @@ StepReport IslandSolver::solve(const IslandInput& input) {
     Impl& s = *m_impl;
     StepReport report;
     s.gather(input);                                                      // one numbering for all shells
-    s.response.begin(input, s.offsets, s.dynamicIndex, s.expected, s.y);  // contacts at the start, alteration y
+    s.response.begin(input, {s.offsets, s.dynamicIndex, s.stepOf}, s.expected, s.y);  // contacts at the start, y
     s.solveStep(input, report);                                           // A, b; filtered PCG until the contacts agree
     if (!s.u.allFinite() || !s.unfiltered.allFinite()) {                  // state untouched; the caller decides
         report.finite = report.converged = false;
@@ -76,6 +82,10 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
     for (std::size_t k = 0; k < input.shells.size(); ++k)
         start.middleCols(offsets[k], input.shells[k]->vertexCount()) = input.shells[k]->velocities();
     y.setZero(3, count);
+    from = start;
+    stepOf.assign(input.shells.size(), input.h);
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        if (input.bodies.empty()) beginTwoStep(input, k);
     dynamicIndex.assign(input.bodies.size(), -1);
     dynamicBodies.clear();
     for (std::size_t b = 0; b < input.bodies.size(); ++b) {
@@ -87,17 +97,81 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
     expected = start + lastChange;
 }
 
+/// BDF2 with steps h and h' before it, r = h / h', gamma = (1 + r) / (1 + 2 r):
+///     q_n+1 = ((1 + r)^2 q_n - r^2 q_n-1) / (1 + 2 r) + gamma h dq/dt_n+1
+/// for positions and velocities: a step of backward Euler of length gamma h from other positions and velocities.
+void IslandSolver::Impl::beginTwoStep(const IslandInput& input, std::size_t k) {
+    Shell& shell = *input.shells[k];
+    shell.m_stride = 1.0;
+    if (shell.settings().integrator != Integrator::Bdf2 || !(shell.m_lastH > 0.0)) return;
+    const double r = input.h / shell.m_lastH, scale = 1.0 / (1.0 + 2.0 * r);
+    const double now = (1.0 + r) * (1.0 + r) * scale, before = -r * r * scale;
+    shell.m_stride = (1.0 + r) * scale;
+    stepOf[k] = shell.m_stride * input.h;
+    from.middleCols(offsets[k], shell.vertexCount()) = now * shell.velocities() + before * shell.m_lastV;
+    y.middleCols(offsets[k], shell.vertexCount()) = (now - 1.0) * shell.positions() + before * shell.m_lastX;
+}
+
 /// One linear solve, as Baraff & Witkin have it. Only where it has stretched an edge far beyond what it was, which the
 /// linearisation at the start did not see coming (an unstressed sheet resists no motion out of its plane), it is
-/// linearised again at the end that it found.
+/// linearised again at the end that it found. Integrator::Newton goes on until the velocities no longer change.
 void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report) {
-    constexpr int kMostNewtonSteps = 5;
+    constexpr int kMostNewtonSteps = 5, kMostToTheEnd = 30;
+    const bool toTheEnd = std::any_of(input.shells.begin(), input.shells.end(), [](const Shell* shell) {
+        return shell->settings().integrator == Integrator::Newton;
+    });
+    const int most = toTheEnd ? kMostToTheEnd : kMostNewtonSteps;
     assemble(input, false);
     for (int newton = 1;; ++newton) {
+        const Points before = v;
         solveRounds(input, report);
-        if (newton == kMostNewtonSteps || !unfiltered.allFinite() || !overstretches(input)) return;
+        if (!unfiltered.allFinite()) return;
+        const bool goOn = toTheEnd ? newton == 1 || improves(input, before) : overstretches(input);
+        if (!goOn) return;
+        if (newton == most) {
+            report.converged = report.converged && !toTheEnd;
+            return;
+        }
         assemble(input, true);
     }
+}
+
+/// After one more Newton step from velocities `before`: goes back along it until the incremental potential is not above
+/// what it was, and says whether it was long enough to be worth another.
+bool IslandSolver::Impl::improves(const IslandInput& input, const Points& before) {
+    constexpr double kSettled = 1e-3;  // of the step's change of velocity, or of what gravity does in it
+    constexpr int kMostHalvings = 8;
+    if (input.bodies.empty()) {
+        const double least = incrementalPotential(input, before);
+        for (int i = 0; i < kMostHalvings && incrementalPotential(input, v) > least + 1e-12 * std::abs(least); ++i)
+            v = 0.5 * (v + before);
+        system.start(v, freeTwist, u);
+    }
+    double change = 0.0, all = floorOfReference(input);
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        for (int i = 0; i < input.shells[k]->vertexCount(); ++i) {
+            const double mass = input.shells[k]->masses()[i];
+            const int column = offsets[k] + i;
+            change += mass * (v.col(column) - before.col(column)).squaredNorm();
+            all += mass * (v.col(column) - start.col(column)).squaredNorm();
+        }
+    return change > kSettled * kSettled * all;
+}
+
+/// What a step of backward Euler minimises: 1/2 |v - v_0|^2_M + W(x + y + h v) - h f_ext . v   [J]
+double IslandSolver::Impl::incrementalPotential(const IslandInput& input, const Points& velocities) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        const Shell& shell = *input.shells[k];
+        const int n = shell.vertexCount();
+        const auto part = velocities.middleCols(offsets[k], n);
+        const auto since = part - from.middleCols(offsets[k], n);
+        for (int i = 0; i < n; ++i)
+            sum += shell.masses()[i] * (0.5 * since.col(i).squaredNorm() - stepOf[k] * input.gravity.dot(part.col(i))) -
+                   stepOf[k] * shell.forces().col(i).dot(part.col(i));
+        sum += shell.elasticEnergy(shell.positions() + y.middleCols(offsets[k], n) + stepOf[k] * part);
+    }
+    return sum;
 }
 
 bool IslandSolver::Impl::overstretches(const IslandInput& input) const {
@@ -107,7 +181,7 @@ bool IslandSolver::Impl::overstretches(const IslandInput& input) const {
         const Points &x = shell.positions(), &rest = shell.restPositions();
         for (const auto& e : shell.mesh().edges()) {
             const Vec3 now = x.col(e.v1) - x.col(e.v0);
-            const Vec3 then = now + input.h * (v.col(offsets[k] + e.v1) - v.col(offsets[k] + e.v0));
+            const Vec3 then = now + stepOf[k] * (v.col(offsets[k] + e.v1) - v.col(offsets[k] + e.v0));
             const double length = (rest.col(e.v1) - rest.col(e.v0)).norm();
             if (then.norm() > std::max(now.norm(), length) + kMost * length) return true;
         }
@@ -121,8 +195,9 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
         const int n = input.shells[k]->vertexCount();
         const Points ahead = atEnd ? Points(v.middleCols(offsets[k], n)) : Points();
         const StepSystem& step =
-            input.shells[k]->m_assembly->assemble(*input.shells[k], input.h, input.gravity, input.wind,
-                                                  y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr);
+            input.shells[k]->m_assembly->assemble(*input.shells[k], stepOf[k], input.gravity, input.wind,
+                                                  from.middleCols(offsets[k], n), y.middleCols(offsets[k], n),
+                                                  atEnd ? &ahead : nullptr);
         parts.push_back({&step.matrix, &step.rhs, offsets[k]});
     }
     std::vector<Mat6> mass;
@@ -200,6 +275,11 @@ void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
         Shell& shell = *input.shells[k];
         const int n = shell.vertexCount();
         lastChange.middleCols(offsets[k], n) = v.middleCols(offsets[k], n) - shell.velocities();
+        if (shell.settings().integrator == Integrator::Bdf2) {
+            shell.m_lastX = shell.m_x;
+            shell.m_lastV = shell.m_v;
+            shell.m_lastH = input.h;
+        }
         shell.m_v = v.middleCols(offsets[k], n);
         shell.m_y = y.middleCols(offsets[k], n);
     }

@@ -23,12 +23,32 @@ void requireFinite(const Vec3& value, const char* what) {
     if (!value.allFinite()) throw std::invalid_argument(std::string(what) + " must be finite");
 }
 
+void requireMaterials(const std::vector<ShellMaterial>& materials, const std::vector<int>& ofTriangle,
+                      int triangleCount) {
+    if (materials.empty()) throw std::invalid_argument("Shell: needs at least one material");
+    for (const auto& material : materials) validate(material);
+    if (ofTriangle.empty() && materials.size() == 1) return;
+    if (static_cast<int>(ofTriangle.size()) != triangleCount)
+        throw std::invalid_argument("Shell: a material must be named for each of the " +
+                                    std::to_string(triangleCount) + " triangles, got " +
+                                    std::to_string(ofTriangle.size()));
+    for (std::size_t t = 0; t < ofTriangle.size(); ++t)
+        if (ofTriangle[t] < 0 || ofTriangle[t] >= static_cast<int>(materials.size()))
+            throw std::invalid_argument("Shell: material of triangle " + std::to_string(t) + " must be 0.." +
+                                        std::to_string(materials.size() - 1) + ", got " +
+                                        std::to_string(ofTriangle[t]));
+}
+
 }  // namespace
 
 Shell::Shell(const TriangleMesh& mesh, const ShellMaterial& material, const ShellSettings& settings)
-    : m_material(material), m_settings(settings), m_rest(mesh.positions), m_x(mesh.positions) {
+    : Shell(mesh, std::vector<ShellMaterial>{material}, {}, settings) {}
+
+Shell::Shell(const TriangleMesh& mesh, std::vector<ShellMaterial> materials, std::vector<int> ofTriangle,
+             const ShellSettings& settings)
+    : m_settings(settings), m_rest(mesh.positions), m_x(mesh.positions) {
     requireUsable(mesh);
-    validate(material);
+    requireMaterials(materials, ofTriangle, static_cast<int>(mesh.triangles.cols()));
     if (!(settings.tolerance > 0.0 && settings.tolerance < 1.0))
         throw std::invalid_argument("ShellSettings.tolerance must be between 0 and 1, got " +
                                     std::to_string(settings.tolerance));
@@ -40,16 +60,31 @@ Shell::Shell(const TriangleMesh& mesh, const ShellMaterial& material, const Shel
     m_v.setZero(3, n);
     m_force.setZero(3, n);
     m_y.setZero(3, n);
-    m_mass.setZero(n);
-    m_restArea.resize(m_mesh->triangleCount());
-    for (int t = 0; t < m_mesh->triangleCount(); ++t) {
-        const auto corners = mesh.triangles.col(t);
-        m_restArea[t] = triangleArea(m_rest.col(corners[0]), m_rest.col(corners[1]), m_rest.col(corners[2]));
-        for (int a = 0; a < 3; ++a) m_mass[corners[a]] += material.areaDensity() * m_restArea[t] / 3.0;
-    }
     m_pinned.assign(n, 0);
     m_pinTarget.assign(n, Vec3::Zero());
-    m_assembly = std::make_unique<ShellAssembly>(*this, m_rest);
+    m_design = std::make_unique<ShellDesign>();
+    m_design->materials = {std::move(materials), std::move(ofTriangle)};
+    setMasses();
+    rebuild();
+}
+
+void Shell::setMasses() {
+    m_mass.setZero(vertexCount());
+    m_restArea.resize(m_mesh->triangleCount());
+    for (int t = 0; t < m_mesh->triangleCount(); ++t) {
+        const auto corners = m_mesh->triangles().col(t);
+        m_restArea[t] = triangleArea(m_rest.col(corners[0]), m_rest.col(corners[1]), m_rest.col(corners[2]));
+        const double density = m_design->materials.at(t).areaDensity();
+        for (int a = 0; a < 3; ++a) m_mass[corners[a]] += density * m_restArea[t] / 3.0;
+    }
+}
+
+void Shell::rebuild() {
+    m_assembly = std::make_unique<ShellAssembly>(*this, *m_design);
+}
+
+const ShellMaterial& Shell::material() const {
+    return m_design->materials.list.front();
 }
 
 Shell::~Shell() = default;
@@ -60,6 +95,7 @@ void Shell::setPositions(const Points& x) {
     requireSize(x, vertexCount(), "Shell positions");
     m_x = x;
     m_y.setZero();
+    m_lastH = 0.0;
     for (int i = 0; i < vertexCount(); ++i)
         if (m_pinned[i]) m_pinTarget[i] = m_x.col(i);
 }
@@ -67,6 +103,12 @@ void Shell::setPositions(const Points& x) {
 void Shell::setVelocities(const Points& v) {
     requireSize(v, vertexCount(), "Shell velocities");
     m_v = v;
+    m_lastH = 0.0;
+}
+
+void Shell::displace(int vertex, const Vec3& by) {
+    m_x.col(vertex) += by;
+    m_lastH = 0.0;
 }
 
 void Shell::requireVertex(int vertex, const char* what) const {
@@ -77,7 +119,7 @@ void Shell::requireVertex(int vertex, const char* what) const {
 
 void Shell::pin(int vertex) {
     requireVertex(vertex, "Shell::pin");
-    m_pinCount += m_pinned[vertex] ? 0 : 1;
+    m_pinCount += m_pinned[vertex] || isGuided(vertex) ? 0 : 1;
     m_pinned[vertex] = 1;
     m_pinTarget[vertex] = m_x.col(vertex);
 }
@@ -91,8 +133,12 @@ void Shell::movePin(int vertex, const Vec3& target) {
 
 void Shell::unpin(int vertex) {
     requireVertex(vertex, "Shell::unpin");
-    m_pinCount -= m_pinned[vertex] ? 1 : 0;
+    m_pinCount -= m_pinned[vertex] || isGuided(vertex) ? 1 : 0;
     m_pinned[vertex] = 0;
+    if (!m_freedom.empty()) {
+        m_freedom[vertex].setIdentity();
+        m_guided[vertex] = 0;
+    }
 }
 
 void Shell::setForce(int vertex, const Vec3& force) {
@@ -111,6 +157,7 @@ ShellEnergy Shell::energy() const {
     for (int i = 0; i < vertexCount(); ++i) e.kinetic += 0.5 * m_mass[i] * m_v.col(i).squaredNorm();
     e.membrane = m_assembly->membrane().value(m_x);
     e.bending = m_assembly->bending().value(m_x);
+    e.plasticWork = m_plasticWork;
     return e;
 }
 
@@ -153,6 +200,17 @@ Points Shell::elasticForces() const {
     return -gradient;
 }
 
+double Shell::elasticEnergy(const Points& x) const {
+    requireSize(x, vertexCount(), "Shell::elasticEnergy: positions");
+    return m_assembly->membrane().value(x) + m_assembly->bending().value(x);
+}
+
+Vec3 Shell::reaction(int vertex, const Vec3& gravity) const {
+    requireVertex(vertex, "Shell::reaction");
+    const StepSystem& system = m_assembly->assembleStatic(*this, gravity, 1.0, HessianKind::Positive);
+    return -system.rhs.col(vertex);
+}
+
 StepReport Shell::step(double h, const Vec3& gravity, const Wind* wind) {
     if (!m_ownSolver) m_ownSolver = std::make_unique<IslandSolver>();
     Shell* self = this;
@@ -163,8 +221,20 @@ StepReport Shell::step(double h, const Vec3& gravity, const Wind* wind) {
 }
 
 void Shell::advance(double h) {
-    m_x += h * m_v + m_y;
+    m_x += (m_stride * h) * m_v + m_y;
     m_y.setZero();
+    m_stride = 1.0;
+    flow();
+}
+
+void Shell::flow() {
+    m_dent = {};
+    if (!m_settings.plasticity) return;
+    const PlasticFlow flow = m_assembly->flow(m_x);
+    if (flow.elements == 0) return;
+    m_plasticWork += flow.work;
+    const auto c = m_mesh->triangles().col(flow.triangle);
+    m_dent = {flow.triangle, (m_x.col(c[0]) + m_x.col(c[1]) + m_x.col(c[2])) / 3.0, flow.work, flow.elements};
 }
 
 }  // namespace jacket

@@ -17,10 +17,26 @@ Stencil<3> gather(const Points& points, const std::array<int, 3>& corners) {
     return result;
 }
 
+/// Triangles that a clamp holds altogether.
+std::vector<char> rigidTriangles(const HalfEdgeMesh& mesh, const std::vector<char>& clamped) {
+    if (clamped.empty()) return {};
+    std::vector<char> rigid(mesh.triangleCount());
+    for (int t = 0; t < mesh.triangleCount(); ++t) {
+        const auto c = mesh.triangles().col(t);
+        rigid[t] = clamped[c[0]] && clamped[c[1]] && clamped[c[2]];
+    }
+    return rigid;
+}
+
 }  // namespace
 
-ShellAssembly::ShellAssembly(const Shell& shell, const Points& rest)
-    : m_energies(makeEnergies(shell.mesh(), rest, shell.material(), shell.settings())) {
+ShellAssembly::ShellAssembly(const Shell& shell, const ShellDesign& design)
+    : m_energies(makeEnergies(shell.mesh(),
+                              {.positions = shell.restPositions(),
+                               .mirrors = design.mirrors,
+                               .rigid = rigidTriangles(shell.mesh(), design.clamped),
+                               .flattened = design.flattened},
+                              design.materials, shell.settings())) {
     std::vector<std::pair<int, int>> pairs;
     for (const auto& edge : shell.mesh().edges()) pairs.emplace_back(edge.v0, edge.v1);  // wind, soft rows
     for (const auto& energy : m_energies) energy->collectPairs(pairs);
@@ -28,33 +44,79 @@ ShellAssembly::ShellAssembly(const Shell& shell, const Points& rest)
     for (const auto& energy : m_energies) energy->bind(m_system.matrix);
     for (int t = 0; t < shell.mesh().triangleCount(); ++t)
         m_triangleSlots.push_back(stencilSlots<3>(m_system.matrix, cornersOf(shell, t)));
+    for (const auto& energy : m_energies)
+        if (const ConstantHessian* constant = energy->constantHessian()) splitConstant(*constant);
 }
 
-const StepSystem& ShellAssembly::assemble(const Shell& shell, double h, const Vec3& gravity, const Wind* wind,
-                                          const Eigen::Ref<const Points>& y, const Points* ahead) {
-    if (ahead) m_end = shell.positions() + h * *ahead + y;
-    m_system.begin(h, shell.material().stiffnessDamping);  // A = 0, b = 0
-    for (const auto& energy : m_energies)
-        energy->addTo(m_system, ahead ? m_end : shell.positions());  // A += (h^2 + h beta) K, b += h f
-    if (ahead)
-        m_system.addAlteration(-h * *ahead);  // b += h^2 K v', linearised at the end
-    else if (!y.isZero(0.0))
-        m_system.addAlteration(y);                                                       // b -= h K y
-    addLoads(shell, gravity);                                                            // b += h f_ext
-    if (wind) addWind(shell, *wind);                                                     // A += h D, b += h (f + D v)
-    m_system.addMass(shell.masses(), shell.velocities(), shell.material().massDamping);  // A += M, b += M v
+/// At most one energy has a constant Hessian.
+void ShellAssembly::splitConstant(const ConstantHessian& hessian) {
+    const BlockMatrix& matrix = m_system.matrix;
+    Constant split{.near = {}, .diagonal = hessian.diagonal(), .beside = {}};
+    std::vector<Eigen::Triplet<double>> beside;
+    for (int row = 0; row < hessian.rows(); ++row)
+        for (ConstantHessian::InnerIterator it(hessian, row); it; ++it) {
+            const int column = static_cast<int>(it.col());
+            if (row == column) continue;
+            if (!matrix.contains(std::max(row, column), std::min(row, column)))
+                beside.emplace_back(row, column, it.value());
+            else if (row > column)
+                split.near.emplace_back(matrix.slot(row, column), it.value());
+        }
+    split.beside.resize(hessian.rows(), hessian.cols());
+    split.beside.setFromTriplets(beside.begin(), beside.end());
+    m_constant = std::move(split);
+}
+
+void ShellAssembly::addEnergies(const Points& x, HessianKind kind) {
+    for (const auto& energy : m_energies) energy->addTo(m_system, x, kind);
+    if (m_constant) m_system.addConstant(m_constant->near, m_constant->diagonal, m_constant->beside);
+}
+
+PlasticFlow ShellAssembly::flow(const Points& x) {
+    PlasticFlow sum;
+    for (const auto& energy : m_energies) {
+        const PlasticFlow flow = energy->flow(x);
+        if (flow.elements == 0) continue;
+        sum.work += flow.work;
+        sum.elements += flow.elements;
+        if (sum.triangle < 0 || flow.most > sum.most) sum.most = flow.most, sum.triangle = flow.triangle;
+    }
+    return sum;
+}
+
+const StepSystem& ShellAssembly::assembleStatic(const Shell& shell, const Vec3& gravity, double load,
+                                                HessianKind kind) {
+    m_system.begin(1.0, 0.0);  // a step of 1 s without mass: A = K, b = f
+    addEnergies(shell.positions(), kind);
+    addLoads(shell, gravity, load);
     return m_system;
 }
 
-void ShellAssembly::addLoads(const Shell& shell, const Vec3& gravity) {
+const StepSystem& ShellAssembly::assemble(const Shell& shell, double h, const Vec3& gravity, const Wind* wind,
+                                          const Points& start, const Eigen::Ref<const Points>& y,
+                                          const Points* ahead) {
+    if (ahead) m_end = shell.positions() + h * *ahead + y;
+    m_system.begin(h, shell.material().stiffnessDamping);  // A = 0, b = 0
+    addEnergies(ahead ? m_end : shell.positions(), HessianKind::Positive);  // A += (h^2 + h beta) K, b += h f
+    if (ahead)
+        m_system.addAlteration(-h * *ahead);  // b += h^2 K v', linearised at the end
+    else if (!y.isZero(0.0))
+        m_system.addAlteration(y);  // b -= h K y
+    addLoads(shell, gravity, 1.0);                                        // b += h f_ext
+    if (wind) addWind(shell, *wind);                                      // A += h D, b += h (f + D v)
+    m_system.addMass(shell.masses(), start, shell.material().massDamping);  // A += M, b += M v
+    return m_system;
+}
+
+void ShellAssembly::addLoads(const Shell& shell, const Vec3& gravity, double load) {
     for (int i = 0; i < shell.vertexCount(); ++i)
-        m_system.addForce(i, shell.masses()[i] * gravity + shell.forces().col(i));
+        m_system.addForce(i, load * (shell.masses()[i] * gravity + shell.forces().col(i)));
     if (shell.pressure() == 0.0) return;
     for (int t = 0; t < shell.mesh().triangleCount(); ++t) {
         const auto corners = cornersOf(shell, t);
         const Stencil<3> x = gather(shell.positions(), corners);
         const Vec3 areaNormal = 0.5 * (x.col(1) - x.col(0)).cross(x.col(2) - x.col(0));
-        for (const int i : corners) m_system.addForce(i, shell.pressure() / 3.0 * areaNormal);
+        for (const int i : corners) m_system.addForce(i, load * shell.pressure() / 3.0 * areaNormal);
     }
 }
 

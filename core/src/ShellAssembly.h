@@ -1,31 +1,53 @@
 #pragma once
 #include <memory>
+#include <optional>
 #include <vector>
 
-#include "energy/Energy.h"
+#include "energy/makeEnergies.h"
 
 namespace jacket {
 
 class Shell;
 struct Wind;
 
+/// What a shell is made as, besides its rest positions.
+struct ShellDesign {
+    Materials materials;
+    std::vector<MirrorPlane> mirrors;
+    std::vector<char> clamped;  ///< per vertex
+    bool flattened = false;
+};
+
 /// A shell's energies, and the matrix of its step with the pattern they need.
 class ShellAssembly {
   public:
-    ShellAssembly(const Shell& shell, const Points& rest);
+    ShellAssembly(const Shell& shell, const ShellDesign& design);
     /// A and b of the step from the shell's present state; valid until the next call. With `ahead`, an estimate of the
     /// velocities at the end of the step, the energies are linearised at the end that it leads to: one more Newton
     /// step.
-    const StepSystem& assemble(const Shell& shell, double h, const Vec3& gravity, const Wind* wind,
+    const StepSystem& assemble(const Shell& shell, double h, const Vec3& gravity, const Wind* wind, const Points& start,
                                const Eigen::Ref<const Points>& y, const Points* ahead = nullptr);
+    /// K and the unbalanced force in `rhs`, at the shell's positions, under `load` times gravity, forces and pressure.
+    const StepSystem& assembleStatic(const Shell& shell, const Vec3& gravity, double load, HessianKind kind);
     const Energy& membrane() const { return *m_energies[0]; }
+    Energy& membrane() { return *m_energies[0]; }
     const Energy& bending() const { return *m_energies[1]; }
+    PlasticFlow flow(const Points& x);
 
   private:
-    void addLoads(const Shell& shell, const Vec3& gravity);
+    void splitConstant(const ConstantHessian& hessian);
+    void addEnergies(const Points& x, HessianKind kind);
+    void addLoads(const Shell& shell, const Vec3& gravity, double load);
     void addWind(const Shell& shell, const Wind& wind);
     std::vector<std::unique_ptr<Energy>> m_energies;  ///< membrane, then bending
     StepSystem m_system;
+    /// Constant Hessians, split by whether the matrix' pattern has their entries.
+    struct Constant {
+        std::vector<std::pair<int, double>> near;
+        Eigen::VectorXd diagonal;
+        ConstantHessian beside;
+    };
+    std::optional<Constant> m_constant;
     Points m_end;  ///< where `ahead` leads
     std::vector<std::array<int, 3>> m_triangleSlots;
 };

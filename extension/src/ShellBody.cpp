@@ -16,9 +16,11 @@ ShellSettings settingsOf(const ShellOptions& o) {
         throw std::invalid_argument("ShellOptions.friction must be >= 0, got " + std::to_string(o.friction));
     return {.membrane = o.membrane,
             .bending = o.bending,
+            .integrator = o.integrator,
             .preconditioner = o.preconditioner,
             .tolerance = o.tolerance,
-            .maxIterations = o.maxIterations};
+            .maxIterations = o.maxIterations,
+            .plasticity = o.plasticity};
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,16 +15,26 @@ namespace jacket {
 
 class IslandSolver;
 class ShellAssembly;
+struct ShellDesign;
 
 enum class Preconditioner { BlockJacobi, IncompleteCholesky };
+
+/// How the state moves through time.
+enum class Integrator {
+    BackwardEuler,  ///< one linear solve a step (Baraff & Witkin 1998), linearised again only where edges overstretch
+    Newton,         ///< backward Euler solved to the end: Newton's method with a line search on the incremental potential
+    Bdf2,           ///< second order, variable step, little damping; near bodies a step is one of backward Euler
+};
 
 /// How a shell is modelled and solved; the defaults are what most scenes want.
 struct ShellSettings {
     MembraneModel membrane = StVenantKirchhoffMembrane{};
-    BendingModel bending = DihedralBending{};
+    BendingModel bending = PatchBending{};
+    Integrator integrator = Integrator::BackwardEuler;
     Preconditioner preconditioner = Preconditioner::IncompleteCholesky;  ///< of an island: its first shell's
     double tolerance = 1e-3;   ///< of the linear solve, relative, in the preconditioner's norm
     int maxIterations = 1000;  ///< of one linear solve
+    bool plasticity = false;   ///< keep bends and stretches beyond the material's yield stress
 };
 
 /// Air that moves past the shells.
@@ -34,9 +45,17 @@ struct Wind {
     double tangentialDrag = 0.02;  ///< C_t [-]
 };
 
-/// Stored and moving energy of one shell [J].
+/// Stored and moving energy of one shell, and what plastic flow has turned into heat so far [J].
 struct ShellEnergy {
-    double kinetic = 0.0, membrane = 0.0, bending = 0.0;
+    double kinetic = 0.0, membrane = 0.0, bending = 0.0, plasticWork = 0.0;
+};
+
+/// Where a shell yielded in its last step.
+struct Dent {
+    int triangle = -1;              ///< with the most plastic work; -1: nothing yielded
+    Vec3 position = Vec3::Zero();   ///< of its centre [m]
+    double work = 0.0;              ///< of the whole shell in the step [J]
+    int elements = 0;               ///< hinges or patches, and triangles in their plane, that yielded
 };
 
 /// One shell: rest shape, state, and how it is held. Positions and velocities are in the vertex order of the mesh.
@@ -48,8 +67,12 @@ class Shell {
     Shell(Shell&&) noexcept;
     Shell& operator=(Shell&&) noexcept;
 
+    /// The same of several materials: triangle t is of materials[ofTriangle[t]]. Damping is the first one's.
+    Shell(const TriangleMesh& mesh, std::vector<ShellMaterial> materials, std::vector<int> ofTriangle,
+          const ShellSettings& settings = {});
+
     const HalfEdgeMesh& mesh() const { return *m_mesh; }
-    const ShellMaterial& material() const { return m_material; }
+    const ShellMaterial& material() const;  ///< the first one
     const ShellSettings& settings() const { return m_settings; }
     int vertexCount() const { return static_cast<int>(m_x.cols()); }
     const Points& restPositions() const { return m_rest; }
@@ -69,6 +92,27 @@ class Shell {
     const Vec3& pinTarget(int vertex) const { return m_pinTarget[vertex]; }
     int pinCount() const { return m_pinCount; }
 
+    /// Holds a vertex in one direction: it slides freely across it. Up to three directions add up; unpin frees it.
+    void guide(int vertex, const Vec3& direction);
+    bool isGuided(int vertex) const { return !m_freedom.empty() && !m_pinned[vertex] && m_guided[vertex]; }
+    /// Projector on the directions in which a vertex may move.
+    Mat3 freedom(int vertex) const;
+
+    /// Pins an edge of the shell together with its tangent plane. Fixing two rows of vertices instead would clamp half a
+    /// cell too late. All vertices given are pinned; those that have free neighbours must lie on one line (or on one
+    /// plane that the shell leaves at a right angle). `direction`: along which the shell leaves the clamp [any length];
+    /// without it, as it does now. Only patch bending can hold the tangent: with other models this pins and no more.
+    void clamp(const std::vector<int>& vertices, std::optional<Vec3> direction = {});
+    /// Says that the shell goes on beyond these border vertices as its mirror image: they are guided along the plane's
+    /// normal, and the tangent there stays at right angles to the plane. For halves and quarters of symmetric scenes.
+    void mirror(const std::vector<int>& vertices, const Vec3& normal);
+
+    /// Another rest shape for the same triangles [m], with its own lengths and curvature. What has been bent or
+    /// stretched for good is forgotten. Throws std::invalid_argument as the constructor does.
+    void setRestPositions(const Points& rest);
+    /// Bending forgets the curvature of the rest shape: the shell wants to be flat.
+    void flattenRest();
+
     /// Constant force on a vertex [N], besides gravity.
     void setForce(int vertex, const Vec3& force);
     const Points& forces() const { return m_force; }
@@ -81,6 +125,12 @@ class Shell {
     Vec3 angularMomentum(const Vec3& about) const;  ///< [N m s]
     double maxStretch() const;                      ///< largest edge length / rest length - 1 [-]
     Points vertexNormals() const;                   ///< area weighted, unit
+    /// Total elastic energy at other positions than the present ones [J].
+    double elasticEnergy(const Points& x) const;
+    /// Force that holds a pinned or guided vertex in static balance: what its own forces leave over [N].
+    Vec3 reaction(int vertex, const Vec3& gravity) const;
+    /// Where it yielded when it last moved.
+    const Dent& lastDent() const { return m_dent; }
     /// Internal forces -dW/dx of the current shape, without damping [N].
     Points elasticForces() const;
 
@@ -89,21 +139,32 @@ class Shell {
     /// Moves every vertex by h v, after a solve.
     void advance(double h);
     /// Puts a vertex somewhere without touching its velocity: for contacts carried along by their body.
-    void displace(int vertex, const Vec3& by) { m_x.col(vertex) += by; }
+    void displace(int vertex, const Vec3& by);
 
   private:
     friend class IslandSolver;
+    friend class StaticSolver;
+    void rebuild();  ///< energies, after the rest shape or how it is clamped changed
+    void setMasses();
+    void flow();
     void requireVertex(int vertex, const char* what) const;  ///< throws std::out_of_range
     std::unique_ptr<HalfEdgeMesh> m_mesh;
-    ShellMaterial m_material;
     ShellSettings m_settings;
     Points m_rest, m_x, m_v, m_force;
-    Points m_y;  ///< position alteration that the next `advance` adds [m]
+    Points m_y;  ///< what the next `advance` adds besides m_stride times velocity [m]
+    double m_stride = 1.0;                 ///< part of the step that velocities count for in it (BDF2: gamma)
+    Points m_lastX, m_lastV;               ///< a step ago, for BDF2
+    double m_lastH = 0.0;                  ///< length of that step; 0: there is none [s]
     Eigen::VectorXd m_mass, m_restArea;
     std::vector<char> m_pinned;
     std::vector<Vec3> m_pinTarget;
+    std::vector<Mat3> m_freedom;  ///< of guided vertices; empty while there are none
+    std::vector<char> m_guided;
+    double m_plasticWork = 0.0;
+    Dent m_dent;
     int m_pinCount = 0;
     double m_pressure = 0.0;
+    std::unique_ptr<ShellDesign> m_design;      ///< rest shape beyond positions, materials
     std::unique_ptr<ShellAssembly> m_assembly;  ///< energies and the step's matrix
     std::unique_ptr<IslandSolver> m_ownSolver;  ///< for step()
 };

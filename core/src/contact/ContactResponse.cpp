@@ -54,12 +54,13 @@ ContactResponse::Touch ContactResponse::makeTouch(const Contact& contact) const 
     return touch;  // frictionless at first: its normal impulse is not known yet
 }
 
-void ContactResponse::begin(const IslandInput& input, const std::vector<int>& offsets,
-                            const std::vector<int>& dynamicIndex, const Points& expected, Points& y) {
+void ContactResponse::begin(const IslandInput& input, const Numbering& numbering, const Points& expected, Points& y) {
     m_input = input;
     m_expected = &expected;
-    m_offsets = offsets;
-    m_dynamicIndex = dynamicIndex;
+    m_y = &y;
+    m_offsets = numbering.offsets;
+    m_dynamicIndex = numbering.dynamicIndex;
+    m_stepOf = numbering.stepOf;
     m_touches.clear();
     m_index.clear();
     m_deepestGap = 0.0;
@@ -70,12 +71,13 @@ void ContactResponse::begin(const IslandInput& input, const std::vector<int>& of
     double shortest = 1e300, speed = 0.0;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
-        for (int i = 0; i < shell.vertexCount(); ++i) m_held[offsets[k] + i] = shell.isPinned(i);
+        for (int i = 0; i < shell.vertexCount(); ++i)
+            m_held[m_offsets[k] + i] = shell.isPinned(i) || shell.isGuided(i);
         m_edge.push_back(meanEdge(shell));
         shortest = std::min(shortest, m_edge.back());
         speed = std::max(speed, shell.velocities().colwise().norm().maxCoeff());
     }
-    for (const auto& anchor : input.anchors) m_held[offsets[anchor.shell] + anchor.vertex] = 1;
+    for (const auto& anchor : input.anchors) m_held[m_offsets[anchor.shell] + anchor.vertex] = 1;
     if (!input.contacts) return;
 
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);
@@ -159,9 +161,11 @@ std::vector<VertexConstraint> ContactResponse::holdConstraints() const {
         const Shell& shell = *m_input.shells[k];
         if (shell.pinCount() == 0) continue;
         for (int i = 0; i < shell.vertexCount(); ++i) {
-            if (!shell.isPinned(i)) continue;
+            if (!shell.isPinned(i) && !shell.isGuided(i)) continue;
             VertexConstraint c{.vertex = m_offsets[k] + i};
-            c.carried = (shell.pinTarget(i) - shell.positions().col(i)) / m_input.h;
+            c.free = shell.freedom(i);
+            if (shell.isPinned(i))
+                c.carried = (shell.pinTarget(i) - shell.positions().col(i) - m_y->col(m_offsets[k] + i)) / m_stepOf[k];
             constraints.push_back(c);
         }
     }

@@ -26,11 +26,16 @@ class ContactResponse {
   public:
     static constexpr int kMaxRounds = 16;  ///< usually 1 to 3; more while a body hits
 
+    /// How an island is numbered.
+    struct Numbering {
+        const std::vector<int>& offsets;       ///< of each shell's vertices
+        const std::vector<int>& dynamicIndex;  ///< of each body; -1: prescribed
+        const std::vector<double>& stepOf;     ///< length of the step as each shell's integrator counts it [s]
+    };
     /// Contacts at the start of the step, and the position alteration y of vertices that stand inside a body.
     /// `expected`: velocities at the end of the step as they would be if the last step's change went on; kept by
     /// reference.
-    void begin(const IslandInput& input, const std::vector<int>& offsets, const std::vector<int>& dynamicIndex,
-               const Points& expected, Points& y);
+    void begin(const IslandInput& input, const Numbering& numbering, const Points& expected, Points& y);
     /// Turns held vertices and active contacts into constraints and rows.
     void writeTo(CoupledSystem& system);
     /// Reads a solve. True when the active set, a linearisation or friction changed so that another solve is needed.
@@ -94,8 +99,9 @@ class ContactResponse {
     int globalVertex(const Contact& c, int corner) const { return m_offsets[c.shell] + c.vertices[corner]; }
 
     IslandInput m_input;
-    const Points* m_expected = nullptr;
+    const Points *m_expected = nullptr, *m_y = nullptr;
     std::vector<int> m_offsets, m_dynamicIndex;
+    std::vector<double> m_stepOf;
     std::vector<Touch> m_touches;
     std::map<Key, int> m_index;
     std::map<Key, Memory> m_memory;

@@ -31,6 +31,11 @@ int BlockMatrix::slot(int row, int column) const {
     return static_cast<int>(found - m_column.begin());
 }
 
+bool BlockMatrix::contains(int row, int column) const {
+    const auto begin = m_column.begin() + m_rowStart[row], end = m_column.begin() + m_rowStart[row + 1];
+    return std::binary_search(begin, end, column);
+}
+
 void BlockMatrix::setZero() {
     std::fill(m_diagonal.begin(), m_diagonal.end(), Mat3::Zero());
     std::fill(m_lower.begin(), m_lower.end(), Mat3::Zero());
@@ -58,6 +63,25 @@ void BlockMatrix::multiply(const double* x, double* y) const {
         y[3 * i] = y0;
         y[3 * i + 1] = y1;
         y[3 * i + 2] = y2;
+    }
+    if (m_beside) addBeside(x, y);
+}
+
+void BlockMatrix::addBeside(const double* x, double* y) const {
+    const int* start = m_beside->outerIndexPtr();
+    const int* column = m_beside->innerIndexPtr();
+    const double* value = m_beside->valuePtr();
+    for (int i = 0; i < size(); ++i) {
+        double y0 = 0.0, y1 = 0.0, y2 = 0.0;
+        for (int k = start[i]; k < start[i + 1]; ++k) {
+            const double* xj = x + 3 * column[k];
+            y0 += value[k] * xj[0];
+            y1 += value[k] * xj[1];
+            y2 += value[k] * xj[2];
+        }
+        y[3 * i] += m_besideFactor * y0;
+        y[3 * i + 1] += m_besideFactor * y1;
+        y[3 * i + 2] += m_besideFactor * y2;
     }
 }
 

@@ -1,4 +1,6 @@
 #pragma once
+#include <Eigen/SparseCore>
+
 #include <span>
 #include <utility>
 #include <vector>
@@ -7,13 +9,18 @@
 
 namespace jacket {
 
-/// Symmetric matrix of 3x3 blocks with a fixed pattern: the diagonal, and the blocks strictly below it by rows.
+/// A symmetric matrix of one scalar per vertex pair, which stands for that scalar times I3.
+using ConstantHessian = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+/// Symmetric matrix of 3x3 blocks with a fixed pattern: the diagonal, and the blocks strictly below it by rows. Scalars
+/// times I3 outside the pattern may stand beside it.
 class BlockMatrix {
   public:
     /// `pairs`: vertex pairs that share a block, in any order and as often as they come. Values become zero.
     void setPattern(int size, std::vector<std::pair<int, int>> pairs);
     /// Index of block (row, column) in lower(), row > column. The pair must be in the pattern.
     int slot(int row, int column) const;
+    bool contains(int row, int column) const;  ///< row > column
     void setZero();
 
     int size() const { return static_cast<int>(m_diagonal.size()); }
@@ -25,12 +32,23 @@ class BlockMatrix {
     int rowEnd(int row) const { return m_rowStart[row + 1]; }
     int column(int k) const { return m_column[k]; }
 
+    /// From now on the matrix has `factor` times `scalars` beside its blocks. They must outlive it; null: nothing.
+    void setBeside(const ConstantHessian* scalars, double factor) {
+        m_beside = scalars;
+        m_besideFactor = factor;
+    }
+    const ConstantHessian* beside() const { return m_beside; }
+    double besideFactor() const { return m_besideFactor; }
+
     /// y = A x over `size()` columns starting at x and y (3 doubles each). They must not overlap.
     void multiply(const double* x, double* y) const;
 
   private:
+    void addBeside(const double* x, double* y) const;
     std::vector<int> m_rowStart, m_column;
     std::vector<Mat3> m_diagonal, m_lower;
+    const ConstantHessian* m_beside = nullptr;
+    double m_besideFactor = 0.0;
 };
 
 }  // namespace jacket

@@ -24,6 +24,7 @@ class StepSystem {
         m_h = h;
         m_stiffnessFactor = h * h + h * stiffnessDamping;
         matrix.setZero();
+        matrix.setBeside(nullptr, 0.0);
         rhs.setZero(3, matrix.size());
     }
 
@@ -33,6 +34,25 @@ class StepSystem {
              const StencilEval<N>& term) {
         for (int a = 0; a < N; ++a) rhs.col(vertices[a]) -= m_h * term.gradient.col(a);
         addMatrix<N>(vertices, slots, term.hessian, m_stiffnessFactor);
+    }
+
+    /// The same piece by piece: dE/dx of all vertices; a block of the Hessian on the diagonal, or off it (see pairSlot).
+    void addGradient(const Points& gradient) { rhs -= m_h * gradient; }
+    void addDiagonal(int vertex, const Mat3& block) { matrix.diagonal()[vertex] += m_stiffnessFactor * block; }
+    void addPair(int slot, const Mat3& block) {
+        if (slot >= 0)
+            matrix.lower()[slot] += m_stiffnessFactor * block;
+        else
+            matrix.lower()[~slot] += m_stiffnessFactor * block.transpose();
+    }
+    /// A Hessian of scalars: `near` has those in the matrix' pattern, slot and value, `diagonal` those on the diagonal;
+    /// `beside` all others, which must outlive the system.
+    void addConstant(const std::vector<std::pair<int, double>>& near, const Eigen::VectorXd& diagonal,
+                     const ConstantHessian& beside) {
+        for (const auto& [slot, value] : near) matrix.lower()[slot].diagonal().array() += m_stiffnessFactor * value;
+        for (int i = 0; i < matrix.size(); ++i)
+            matrix.diagonal()[i].diagonal().array() += m_stiffnessFactor * diagonal[i];
+        matrix.setBeside(&beside, m_stiffnessFactor);
     }
 
     /// A linear damping force -D v; its h D v_n on the right cancels the force itself.
@@ -90,16 +110,20 @@ class StepSystem {
     Points m_scratch;
 };
 
-/// Where the blocks (a, b), b < a, of a stencil live in the matrix: the slot of lower block (v_a, v_b), or ~slot of
-/// (v_b, v_a) when v_b > v_a.
+/// Where block (a, b) of two different vertices lives in the matrix: the slot of lower block (a, b), or ~slot of (b, a)
+/// when b > a.
+inline int pairSlot(const BlockMatrix& matrix, int a, int b) {
+    return a > b ? matrix.slot(a, b) : ~matrix.slot(b, a);
+}
+
+/// The pairSlot of each block (a, b), b < a, of a stencil.
 template <int N>
 std::array<int, N*(N - 1) / 2> stencilSlots(const BlockMatrix& matrix, const std::array<int, N>& vertices) {
     std::array<int, N*(N - 1) / 2> slots;
     int pair = 0;
     for (int a = 0; a < N; ++a)
         for (int b = 0; b < a; ++b, ++pair)
-            slots[pair] = vertices[a] > vertices[b] ? matrix.slot(vertices[a], vertices[b])
-                                                    : ~matrix.slot(vertices[b], vertices[a]);
+            slots[pair] = pairSlot(matrix, vertices[a], vertices[b]);
     return slots;
 }
 

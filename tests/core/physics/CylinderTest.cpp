@@ -79,13 +79,9 @@ void forDirections(const Check& check) {
 
 template <class Model>
 class CylinderTest : public testing::Test {};
-template <class>
-struct Alternatives;
-template <class... Models>
-struct Alternatives<std::variant<Models...>> {
-    using Types = testing::Types<Models...>;
-};
-TYPED_TEST_SUITE(CylinderTest, Alternatives<BendingModel>::Types);
+using HingeModels =
+    testing::Types<DihedralBending, DihedralDifferenceBending, QuadraticBending, CubicShellBending>;
+TYPED_TEST_SUITE(CylinderTest, HingeModels);
 
 constexpr double kTolerance = 5e-4;  // of O(0.02^2): cells subtend 0.02 rad
 

@@ -45,6 +45,7 @@ struct CubicShellBending {
         Eigen::Matrix4d matrix;            ///< quadratic part, times I3 [N/m]; its rows sum to zero
         double volume;                     ///< factor of (e0 x e1).e2 [N/m^2]
         double constant;                   ///< makes the energy at rest zero [J]
+        Stencil<4> shape;                  ///< at rest [m]
     };
 
     CubicShellBending fittedTo(const ShellMaterial& material) const {
@@ -55,6 +56,7 @@ struct CubicShellBending {
     Rest rest(const Stencil<4>& X, double area) const {
         requireHinge(X, "CubicShellBending");
         Rest r;
+        r.shape = X;
         r.dihedral = DihedralBending{stiffness}.rest(X, area);
         r.quadratic = QuadraticBending{stiffness}.rest(X, area);
         const double cosine = std::cos(r.dihedral.angle), sine = std::sin(r.dihedral.angle);
@@ -126,6 +128,21 @@ struct CubicShellBending {
         return result;
     }
 
+    /// As DihedralBending; the polynomial is set up again for the hinge folded to its new angle.
+    template <class = void>
+    bool flow(const Stencil<4>& x, double area, const YieldRule& rule, Rest& r, double& accumulated) const {
+        DihedralBending::Rest dihedral = r.dihedral;
+        if (!DihedralBending{stiffness}.flow(x, area, rule, dihedral, accumulated)) return false;
+        Stencil<4> folded = r.shape;
+        const Vec3 axis = (folded.col(1) - folded.col(0)).normalized();
+        // theta grows as x3 turns against its normal's side
+        folded.col(3) = folded.col(0) + Eigen::AngleAxisd(dihedral.angle - r.dihedral.angle, axis) *
+                                            (r.shape.col(3) - r.shape.col(0));
+        r = rest(folded, area);
+        r.dihedral.angle = dihedral.angle;
+        return true;
+    }
+
   private:
     template <class = void>
     static double energyOf(const Stencil<3>& e, const Rest& r) {
@@ -144,6 +161,6 @@ struct CubicShellBending {
         return g;
     }
 };
-static_assert(StencilModel<CubicShellBending>);
+static_assert(StencilModel<CubicShellBending> && PlasticStencilModel<CubicShellBending>);
 
 }  // namespace jacket

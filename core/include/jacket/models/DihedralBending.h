@@ -62,6 +62,20 @@ struct DihedralBending {
         return result;
     }
 
+    /// Bending beyond the limit stays: the isotropic rule of O'Brien et al. 2002 with linear hardening, on the curvature
+    /// e = l / (A0 + A1) (theta - theta0), `accumulated` in 1/m.
+    template <class = void>
+    bool flow(const Stencil<4>& x, double area, const YieldRule& rule, Rest& r, double& accumulated) const {
+        const double bend = wrapped(angle(x) - r.angle), perAngle = r.length / area;
+        const double limit = rule.curvature + rule.hardening * accumulated;
+        const double excess = std::abs(bend) * perAngle - limit;
+        if (!(excess > kYieldRounding * limit)) return false;
+        const double slip = excess / (1.0 + rule.hardening);
+        accumulated += slip;
+        r.angle = wrapped(r.angle + std::copysign(slip / perAngle, bend));
+        return true;
+    }
+
     /// A deformed hinge: the angle and its derivatives. `restLength` sets below what sizes it counts as collapsed.
     class Shape {
       public:
@@ -144,6 +158,6 @@ struct DihedralBending {
     /// The same angle in [-pi, pi].
     static double wrapped(double angle) { return std::remainder(angle, 2.0 * std::numbers::pi); }
 };
-static_assert(StencilModel<DihedralBending>);
+static_assert(StencilModel<DihedralBending> && PlasticStencilModel<DihedralBending>);
 
 }  // namespace jacket

@@ -1,4 +1,6 @@
 #pragma once
+#include <Eigen/Eigenvalues>
+
 #include <cmath>
 #include <optional>
 
@@ -89,11 +91,7 @@ struct StVenantKirchhoffMembrane {
         const Vec3 a = x.col(1) - x.col(0), b = x.col(2) - x.col(0);
         const Eigen::Matrix<double, 3, 2> F = a * g1 + b * g2;
         const Mat2 e = 0.5 * (F.transpose() * F - Mat2::Identity());
-        Mat2 S = r.shear * e + r.dilation * e.trace() * Mat2::Identity();  // times A
-        if (weftStiffness) {
-            S(0, 0) += r.warp * e(0, 0);
-            S(1, 1) += r.weft * e(1, 1);
-        }
+        const Mat2 S = stressOf(e, r);
 
         StencilEval<3> result;
         result.energy = 0.5 * S.cwiseProduct(e).sum();
@@ -127,7 +125,71 @@ struct StVenantKirchhoffMembrane {
         return result;
     }
 
+    /// Area times thickness times stress S that the strain's first-order change along dx leads to from x [N m].
+    template <class = void>
+    Mat2 predictedStress(const Stencil<3>& x, const Stencil<3>& dx, const Rest& r) const {
+        const Eigen::RowVector2d g1 = r.inverseFrame.row(0), g2 = r.inverseFrame.row(1);
+        const Eigen::Matrix<double, 3, 2> F = (x.col(1) - x.col(0)) * g1 + (x.col(2) - x.col(0)) * g2;
+        const Eigen::Matrix<double, 3, 2> dF = (dx.col(1) - dx.col(0)) * g1 + (dx.col(2) - dx.col(0)) * g2;
+        const Mat2 e = 0.5 * (F.transpose() * F - Mat2::Identity() + dF.transpose() * F + F.transpose() * dF);
+        return stressOf(e, r);
+    }
+
+    /// What a stress adds to the exact Hessian, times I3 [N/m].
+    template <class = void>
+    Mat3 geometricHessian(const Mat2& S, const Rest& r) const {
+        Eigen::Matrix<double, 3, 2> g;
+        g << -r.inverseFrame.colwise().sum(), r.inverseFrame;
+        return g * S * g.transpose();
+    }
+
+    /// Stretching beyond the limit stays: von Mises' rule in plane stress with the associated flow, which keeps the
+    /// volume (the sheet thins where it stretches), and linear hardening; `accumulated` is the equivalent plastic
+    /// strain. The rest metric moves along the principal strains. Orthotropic sheets do not yield in their plane.
+    /// Source: cutting-plane return mapping, Simo and Hughes, Computational Inelasticity, 1998, ch. 3.
+    template <class = void>
+    bool flow(const Stencil<3>& x, double area, const YieldRule& rule, Rest& r, double& accumulated) const {
+        if (weftStiffness) return false;
+        const Eigen::Matrix<double, 3, 2> F = (x.col(1) - x.col(0)) * r.inverseFrame.row(0) +
+                                              (x.col(2) - x.col(0)) * r.inverseFrame.row(1);
+        const Eigen::SelfAdjointEigenSolver<Mat2> principal(F.transpose() * F);
+        const Vec2 squared = principal.eigenvalues();  // of the stretches
+        Mat2 law;                                      // thickness times stress from Green strain [N/m]
+        law << r.shear + r.dilation, r.dilation, r.dilation, r.shear + r.dilation;
+        law /= area;
+        Vec2 plastic = Vec2::Zero();  // logarithmic strains
+        bool yields = false;
+        for (int iteration = 0; iteration < 50; ++iteration) {
+            const Vec2 left = squared.cwiseProduct((-2.0 * plastic).array().exp().matrix());
+            const Vec2 tension = law * (0.5 * (left - Vec2::Ones()));
+            const double mises = std::sqrt(tension.squaredNorm() - tension[0] * tension[1]);
+            const double excess = mises - rule.tension - rule.stiffening * accumulated;
+            if (!(excess > kYieldRounding * (rule.tension + rule.stiffening * accumulated))) break;
+            const Vec2 direction = Vec2(2.0 * tension[0] - tension[1], 2.0 * tension[1] - tension[0]) / (2.0 * mises);
+            const double slip =
+                excess / (direction.dot(law * left.cwiseProduct(direction)) + rule.stiffening);  // Newton's step
+            plastic += slip * direction;
+            accumulated += slip;
+            yields = true;
+        }
+        if (!yields) return false;
+        const Mat2& axes = principal.eigenvectors();
+        r.inverseFrame = (r.inverseFrame * axes * (-plastic).array().exp().matrix().asDiagonal() * axes.transpose()).eval();
+        return true;
+    }
+
   private:
+    /// Times A.
+    template <class = void>
+    Mat2 stressOf(const Mat2& e, const Rest& r) const {
+        Mat2 S = r.shear * e + r.dilation * e.trace() * Mat2::Identity();
+        if (weftStiffness) {
+            S(0, 0) += r.warp * e(0, 0);
+            S(1, 1) += r.weft * e(1, 1);
+        }
+        return S;
+    }
+
     /// Fills what of weft and shear is still unset as in the isotropic sheet, and checks all of it.
     void completeOrthotropy() {
         const double k = *stretchStiffness, nu = *poisson;
@@ -153,6 +215,6 @@ struct StVenantKirchhoffMembrane {
         return (mean + radius) / (2.0 * radius) * (S - (mean - radius) * Mat2::Identity());
     }
 };
-static_assert(StencilModel<StVenantKirchhoffMembrane>);
+static_assert(StencilModel<StVenantKirchhoffMembrane> && PlasticStencilModel<StVenantKirchhoffMembrane>);
 
 }  // namespace jacket

@@ -58,6 +58,26 @@ concept DampedStencilModel = StencilModel<Model> &&
     { model.damping(x, rest) } -> std::same_as<Eigen::Matrix<double, 3 * Model::kVertices, 3 * Model::kVertices>>;
 };
 
+/// Where a sheet stops springing back.
+struct YieldRule {
+    double curvature;    ///< e_y [1/m]
+    double tension;      ///< sigma_y t [N/m]
+    double hardening;    ///< H / E: how much both grow with accumulated plastic strain, relative to the elastic slope [-]
+    double stiffening;   ///< H t [N/m]
+};
+
+/// What has just been returned to the limit does not yield again.
+inline constexpr double kYieldRounding = 1e-12;
+
+/// A model whose rest data can yield. `flow` returns false and changes nothing within the elastic limit; else it moves
+/// `rest` so that the strain is back on the limit, and adds the plastic strain to `accumulated`. `area` as for rest().
+template <class Model>
+concept PlasticStencilModel = StencilModel<Model> &&
+    requires(const Model model, const Stencil<Model::kVertices> x, double area, const YieldRule rule,
+             typename Model::Rest rest, double accumulated) {
+    { model.flow(x, area, rule, rest, accumulated) } -> std::same_as<bool>;
+};
+
 /// The matrix  m (x) I3  of a scalar stencil matrix m.
 template <int N>
 Eigen::Matrix<double, 3 * N, 3 * N> timesIdentity3(const Eigen::Matrix<double, N, N>& m) {

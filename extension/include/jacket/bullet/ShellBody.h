@@ -15,7 +15,9 @@ namespace jacket::bullet {
 /// How a shell behaves in a Bullet world; the defaults are what most scenes want.
 struct ShellOptions {
     MembraneModel membrane = StVenantKirchhoffMembrane{};
-    BendingModel bending = DihedralBending{};
+    BendingModel bending = PatchBending{};
+    Integrator integrator = Integrator::BackwardEuler;
+    bool plasticity = false;         ///< keep bends and stretches beyond the material's yield stress
     double tolerance = 1e-3;         ///< of the linear solve, relative
     int maxIterations = 1000;        ///< of one linear solve
     double friction = 0.5;           ///< multiplied with the body's, as Bullet does [-]
