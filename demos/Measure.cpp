@@ -22,6 +22,7 @@ EnergyBalance energyOf(const World& world, const std::vector<BodyState>& bodies)
         sum.kinetic += energy.kinetic;
         sum.membrane += energy.membrane;
         sum.bending += energy.bending;
+        sum.plasticWork += energy.plasticWork;
         sum.potential -= gravity.dot(shell.positions() * shell.masses());
     }
     for (const BodyState& body : bodies) {

@@ -67,6 +67,9 @@ void Result::add(const FrameRecord& frame) {
     m_momentumDrift = std::max(m_momentumDrift, drift.norm());
     m_converged = m_converged && frame.report.converged;
     m_finite = m_finite && frame.report.finite && frame.isStateFinite;
+    m_yielding.resize(std::max(m_yielding.size(), frame.report.dents.size()));
+    for (std::size_t k = 0; k < frame.report.dents.size(); ++k)
+        if (frame.report.dents[k].work > m_yielding[k].most.work) m_yielding[k] = {frame.report.dents[k], frame.time};
 }
 
 /// Relative to the momentum at the start or, where that is nearly none, to the sum of the momenta that move about.
@@ -100,7 +103,7 @@ Json Result::json(const World& end) const {
                              {"body", scene.bodies[m_deepest.penetration.body].name}};
     result["energy"] = {
         {"kinetic", numberOrNull(m_end.energy.kinetic)},     {"membrane", numberOrNull(m_end.energy.membrane)},
-        {"bending", numberOrNull(m_end.energy.bending)},     {"plastic_work", 0.0},
+        {"bending", numberOrNull(m_end.energy.bending)},     {"plastic_work", numberOrNull(m_end.energy.plasticWork)},
         {"potential", numberOrNull(m_end.energy.potential)}, {"start", numberOrNull(m_start.energy.total())},
         {"end", numberOrNull(m_end.energy.total())}};
     result["momentum_error"] = isFree(scene) ? numberOrNull(momentumError()) : Json(nullptr);
@@ -108,6 +111,15 @@ Json Result::json(const World& end) const {
     result["finite"] = m_finite;
     result["rejected_steps"] = end.rejectedSteps();
     result["shells"] = shellsToJson(end);
+    for (std::size_t k = 0; k < m_yielding.size(); ++k) {
+        const auto& [most, time] = m_yielding[k];
+        if (most.triangle < 0) continue;
+        result["shells"][k]["dent"] = {{"time", time},
+                                       {"position", toJson(most.position)},
+                                       {"triangle", most.triangle},
+                                       {"elements", most.elements},
+                                       {"work", most.work}};
+    }
     result["bodies"] = bodiesToJson(end);
     result["probes"] = Json::object();
     for (const ProbeDescription& probe : scene.probes) result["probes"][probe.name] = probeValue(probe, end);

@@ -28,6 +28,11 @@ class Result {
     double m_iterations = 0.0;  ///< over all steps
     int m_mostIterations = 0, m_substeps;
     bool m_converged = true, m_finite = true;
+    struct Yielding {
+        Dent most;  ///< of the frame with the most plastic work
+        double time = 0.0;
+    };
+    std::vector<Yielding> m_yielding;  ///< of each shell
 };
 
 /// A page for people, from result.json.

@@ -47,6 +47,7 @@ std::vector<int> Selection::vertices(const Points& positions) const {
 }
 
 int Scene::frames() const {
+    if (isStatic) return 1;
     return std::max(1, static_cast<int>(std::ceil(seconds / dt - 1e-6)));
 }
 

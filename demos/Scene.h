@@ -52,6 +52,25 @@ struct Load {
     Vec3 total;  ///< [N]
 };
 
+/// An edge held together with its tangent.
+struct Clamp {
+    Selection where;
+    std::optional<Vec3> direction;  ///< along which the shell leaves it; without it, as it does at the start
+};
+
+/// Vertices that slide freely across a direction.
+struct Guide {
+    Selection where;
+    Vec3 direction;
+};
+
+/// Part of a shell that is of another material: the triangles whose centres lie in a box at the start.
+struct Region {
+    Selection::Bounds box;
+    std::string label;
+    ShellMaterial material;
+};
+
 struct ShellDescription {
     std::string name, label;
     MeshSource mesh;
@@ -65,14 +84,20 @@ struct ShellDescription {
     double tolerance = 1e-3;       ///< of the linear solve, relative
     int maxIterations = 1000;      ///< of one linear solve
     double contactThickness = -1;  ///< [m]; < 0: half the thickness
+    Integrator integrator = Integrator::BackwardEuler;
+    bool plasticity = false;   ///< keep bends and stretches beyond the yield stress
+    bool flattenRest = false;  ///< bending forgets the curvature of the mesh
+    std::vector<Region> regions;
     std::vector<Selection> pins;
+    std::vector<Clamp> clamps;
+    std::vector<Guide> guides;
     std::vector<Load> loads;
     double pressure = 0.0;                ///< [Pa]
     Vec3 initialVelocity = Vec3::Zero();  ///< [m/s]
     double perturbation = 0.0;            ///< free vertices start up to this far away, at random [m]
 };
 
-/// Prescribed motion of a body, which then stands still.
+/// Prescribed motion of a body, which goes on with the next such phase, and then stands still.
 struct Kinematic {
     Vec3 velocity;  ///< [m/s]
     double until;   ///< [s]
@@ -86,7 +111,7 @@ struct BodyDescription {
     Vec3 velocity = Vec3::Zero();         ///< [m/s]
     Vec3 angularVelocity = Vec3::Zero();  ///< [rad/s]
     double friction = 0.5;                ///< [-]
-    std::optional<Kinematic> kinematic;
+    std::vector<Kinematic> kinematic;  ///< phases, in order of time; empty: not kinematic
 };
 
 struct ProbeDescription {
@@ -109,6 +134,8 @@ struct Scene {
     std::uint64_t seed = 0;
     Vec3 gravity{0, -9.81, 0};  ///< [m/s^2]
     std::optional<Wind> wind;
+    bool isStatic = false;   ///< one frame, in which every shell goes to its equilibrium
+    int loadIncrements = 1;  ///< in which gravity, forces and pressure grow there
     std::vector<ShellDescription> shells;
     std::vector<BodyDescription> bodies;
     std::vector<ProbeDescription> probes;

@@ -15,6 +15,7 @@ namespace {
 using Names = std::vector<std::string>;
 
 constexpr std::array kSceneKeys{"name",    "description", "dt",     "substeps", "seconds", "seed",  "mode",
+                                "load_increments",
                                 "gravity", "wind",        "shells", "bodies",   "probes",  "camera"};
 constexpr std::array kShellKeys{"name",
                                 "mesh",
@@ -28,6 +29,10 @@ constexpr std::array kShellKeys{"name",
                                 "max_iterations",
                                 "pin",
                                 "clamp",
+                                "guide",
+                                "regions",
+                                "plasticity",
+                                "flatten_rest",
                                 "force",
                                 "pressure",
                                 "initial_velocity",
@@ -200,6 +205,12 @@ void readMaterial(ObjectReader& in, ShellDescription& shell) {
     shell.material = readMaterialFields(fields, start);
 }
 
+Vec3 readDirection(ObjectReader& in) {
+    const Vec3 direction = in.vector("direction");
+    if (!(direction.norm() > 0)) in.fail("direction", "must not be zero");
+    return direction.normalized();
+}
+
 template <class Variant>
 Variant readModel(ObjectReader& in, std::string_view key) {
     const Json* value = in.find(key);
@@ -217,14 +228,45 @@ Variant readModel(ObjectReader& in, std::string_view key) {
 }
 
 void readNotYet(ObjectReader& in) {
-    const auto isEmptyList = [](const Json* value) { return value && value->is_array() && value->empty(); };
-    if (!isEmptyList(in.find("clamp"))) in.notYet("clamp", "clamping an edge with its tangent");
     if (in.flag("self_collision", false)) in.notYet("self_collision", "self-collision");
-    static const Names now{"backward-euler"}, later{"newton", "bdf2"};
-    const Json* integrator = in.find("integrator");
-    if (integrator && std::find(later.begin(), later.end(), *integrator) != later.end())
-        in.notYet("integrator", "\"" + integrator->get<std::string>() + "\"");
-    in.choice("integrator", now, "backward-euler");
+}
+
+/// How edges and vertices are held besides pins.
+void readSupports(ObjectReader& in, ShellDescription& shell) {
+    in.forEach("clamp", [&](ObjectReader clamp) {
+        Clamp entry{readSelection(clamp), {}};
+        if (clamp.has("direction")) entry.direction = readDirection(clamp);
+        shell.clamps.push_back(std::move(entry));
+        clamp.finish();
+    });
+    in.forEach("guide", [&](ObjectReader guide) {
+        shell.guides.push_back({readSelection(guide), readDirection(guide)});
+        guide.finish();
+    });
+}
+
+void readRegions(ObjectReader& in, ShellDescription& shell) {
+    in.forEach("regions", [&](ObjectReader region) {
+        const Selection where = readSelection(region);
+        const auto* box = std::get_if<Selection::Bounds>(&where.what);
+        if (!box) region.fail("vertices", "regions are boxes: the triangles whose centres lie inside");
+        ShellDescription part;
+        readMaterial(region, part);
+        shell.regions.push_back({*box, region.label(), part.material});
+        region.finish();
+    });
+}
+
+void readMotion(ObjectReader& in, ShellDescription& shell) {
+    static const Names integrators{"backward-euler", "newton", "bdf2"};
+    const std::string integrator = in.choice("integrator", integrators, "backward-euler");
+    shell.integrator = integrator == "newton" ? Integrator::Newton
+                       : integrator == "bdf2" ? Integrator::Bdf2
+                                              : Integrator::BackwardEuler;
+    bool yields = shell.material.yieldStress.has_value();
+    for (const Region& region : shell.regions) yields = yields || region.material.yieldStress.has_value();
+    shell.plasticity = in.flag("plasticity", yields);
+    shell.flattenRest = in.flag("flatten_rest", false);
 }
 
 ShellDescription readShell(ObjectReader in, const fs::path& folder, std::size_t index) {
@@ -240,6 +282,8 @@ ShellDescription readShell(ObjectReader in, const fs::path& folder, std::size_t 
         transform.finish();
     }
     readMaterial(in, shell);
+    readRegions(in, shell);
+    readMotion(in, shell);
     shell.membrane = readModel<MembraneModel>(in, "membrane");
     shell.bending = readModel<BendingModel>(in, "bending");
     shell.friction = in.number("friction", Range::nonNegative(), shell.friction);
@@ -250,6 +294,7 @@ ShellDescription readShell(ObjectReader in, const fs::path& folder, std::size_t 
         shell.pins.push_back(readSelection(pin));
         pin.finish();
     });
+    readSupports(in, shell);
     in.forEach("force", [&](ObjectReader force) {
         shell.loads.push_back({readSelection(force), force.vector("total")});
         force.finish();
@@ -287,12 +332,29 @@ Shape readShape(ObjectReader in, const fs::path& folder) {
 /// Refuses what would silently do nothing.
 void checkBody(const ObjectReader& in, const BodyDescription& body) {
     const bool moves = body.velocity.norm() > 0 || body.angularVelocity.norm() > 0;
-    if (body.kinematic && body.mass > 0)
+    if (!body.kinematic.empty() && body.mass > 0)
         in.fail("kinematic", "needs mass 0: nothing can push a body whose motion is given");
     if (body.mass == 0 && moves)
         in.fail("velocity", "needs a mass > 0, or \"kinematic\": a body of mass 0 stands still");
-    if (std::holds_alternative<Plane>(body.shape) && (body.mass > 0 || body.kinematic))
+    if (std::holds_alternative<Plane>(body.shape) && (body.mass > 0 || !body.kinematic.empty()))
         in.fail("shape", "is a plane, which must be static: mass 0 and not kinematic");
+}
+
+/// One phase, or a list of them in order of time.
+std::vector<Kinematic> readKinematic(ObjectReader& in) {
+    std::vector<Kinematic> phases;
+    const auto read = [&](ObjectReader motion) {
+        const double start = phases.empty() ? 0.0 : phases.back().until;
+        phases.push_back({motion.vector("velocity"), motion.number("until", Range::nonNegative("s"), 1e9)});
+        if (phases.back().until < start) motion.fail("until", "must not be before the phase that precedes it ends");
+        motion.finish();
+    };
+    const Json* value = in.find("kinematic");
+    if (value && value->is_array())
+        in.forEach("kinematic", read);
+    else if (value)
+        read(in.object("kinematic"));
+    return phases;
 }
 
 BodyDescription readBody(ObjectReader in, const fs::path& folder, std::size_t index) {
@@ -306,11 +368,7 @@ BodyDescription readBody(ObjectReader in, const fs::path& folder, std::size_t in
     body.velocity = in.vector("velocity", Vec3::Zero());
     body.angularVelocity = in.vector("angular_velocity", Vec3::Zero());
     body.friction = in.number("friction", Range::nonNegative(), body.friction);
-    if (in.has("kinematic")) {
-        ObjectReader motion = in.object("kinematic");
-        body.kinematic = {motion.vector("velocity"), motion.number("until", Range::nonNegative("s"), 1e9)};
-        motion.finish();
-    }
+    body.kinematic = readKinematic(in);
     checkBody(in, body);
     return body;
 }
@@ -376,9 +434,9 @@ void readRun(ObjectReader& in, Scene& scene) {
     scene.gravity = in.vector("gravity", scene.gravity);
     scene.wind = readWind(in);
     if (in.has("camera")) scene.camera = readCamera(in.object("camera"));
-    static const Names modes{"dynamic"};
-    if (const Json* mode = in.find("mode"); mode && *mode == "static") in.notYet("mode", "static equilibrium");
-    in.choice("mode", modes, "dynamic");
+    static const Names modes{"dynamic", "static"};
+    scene.isStatic = in.choice("mode", modes, "dynamic") == "static";
+    scene.loadIncrements = in.integer("load_increments", 1, scene.loadIncrements);
     constexpr double kMostFrames = 1e8;
     if (scene.seconds / scene.dt > kMostFrames)
         in.fail("seconds", "[s] must be <= 1e8 frames of dt, got " + shortNumber(scene.seconds));

@@ -72,7 +72,11 @@ Json toJson(const ShellDescription& shell) {
     json["material"] = toJson(shell.material);
     json["membrane"] = modelToJson(shell.membrane);
     json["bending"] = modelToJson(shell.bending);
-    json["integrator"] = "backward-euler";
+    json["integrator"] = shell.integrator == Integrator::Newton ? "newton"
+                         : shell.integrator == Integrator::Bdf2 ? "bdf2"
+                                                                : "backward-euler";
+    json["plasticity"] = shell.plasticity;
+    json["flatten_rest"] = shell.flattenRest;
     json["friction"] = shell.friction;
     json["tolerance"] = shell.tolerance;
     json["max_iterations"] = shell.maxIterations;
@@ -80,6 +84,18 @@ Json toJson(const ShellDescription& shell) {
     json["self_collision"] = false;
     json["pin"] = Json::array();
     for (const Selection& pin : shell.pins) json["pin"].push_back(toJson(pin));
+    for (const char* key : {"clamp", "guide", "regions"}) json[key] = Json::array();
+    for (const Clamp& clamp : shell.clamps) {
+        json["clamp"].push_back(toJson(clamp.where));
+        if (clamp.direction) json["clamp"].back()["direction"] = demo::toJson(*clamp.direction);
+    }
+    for (const Guide& guide : shell.guides) {
+        json["guide"].push_back(toJson(guide.where));
+        json["guide"].back()["direction"] = demo::toJson(guide.direction);
+    }
+    for (const Region& region : shell.regions)
+        json["regions"].push_back({{"box", {demo::toJson(region.box.min), demo::toJson(region.box.max)}},
+                                   {"material", toJson(region.material)}});
     json["force"] = Json::array();
     for (const Load& load : shell.loads) {
         json["force"].push_back(toJson(load.where));
@@ -97,8 +113,8 @@ Json toJson(const BodyDescription& body) {
     json["velocity"] = demo::toJson(body.velocity);
     json["angular_velocity"] = demo::toJson(body.angularVelocity);
     json["friction"] = body.friction;
-    if (body.kinematic)
-        json["kinematic"] = {{"velocity", demo::toJson(body.kinematic->velocity)}, {"until", body.kinematic->until}};
+    for (const auto& [velocity, until] : body.kinematic)
+        json["kinematic"].push_back({{"velocity", demo::toJson(velocity)}, {"until", until}});
     return json;
 }
 
@@ -128,9 +144,9 @@ Json toJson(const CameraDescription& camera) {
 }  // namespace
 
 Json toJson(const Scene& scene) {
-    Json json{{"name", scene.name}, {"description", scene.description}, {"mode", "dynamic"},
+    Json json{{"name", scene.name}, {"description", scene.description}, {"mode", scene.isStatic ? "static" : "dynamic"},
               {"dt", scene.dt},     {"substeps", scene.substeps},       {"seconds", scene.seconds},
-              {"seed", scene.seed}, {"gravity", toJson(scene.gravity)}};
+              {"seed", scene.seed}, {"load_increments", scene.loadIncrements}, {"gravity", toJson(scene.gravity)}};
     if (scene.wind) json["wind"] = toJson(*scene.wind);
     json["shells"] = json["bodies"] = json["probes"] = Json::array();
     for (const auto& shell : scene.shells) json["shells"].push_back(toJson(shell));

@@ -93,6 +93,9 @@ struct World::Impl {
         for (const ProbeDescription& probe : scene.probes)
             if (probe.where) probe.where->vertices(starts[probe.shell]);  // throws now rather than after the run
         if (scene.wind) shells.setWind(*scene.wind);
+        if (scene.isStatic && (!scene.bodies.empty() || scene.wind))
+            throw InputError("mode: \"static\" settles shells under gravity, forces and pressure alone; the scene has " +
+                             std::string(scene.wind ? "wind" : "bodies"));
     }
 
     void addBody(BodyDescription& description) {
@@ -114,7 +117,7 @@ struct World::Impl {
         entry.body->setActivationState(DISABLE_DEACTIVATION);  // Bullet puts bodies to sleep that still swing slowly
         entry.body->setLinearVelocity(toBullet(description.velocity));
         entry.body->setAngularVelocity(toBullet(description.angularVelocity));
-        if (description.kinematic)
+        if (!description.kinematic.empty())
             entry.body->setCollisionFlags(entry.body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
         world.addRigidBody(entry.body.get());
         bodies.push_back(std::move(entry));
@@ -129,15 +132,32 @@ struct World::Impl {
         options.maxIterations = description.maxIterations;
         options.friction = description.friction;
         options.contactThickness = description.contactThickness;
-        bullet::ShellBody* shell = nullptr;
+        options.integrator = description.integrator;
+        options.plasticity = description.plasticity;
+        const Points start = startPositions(description, mesh);
+        for (const Region& region : description.regions)
+            options.regions.push_back({region.material, trianglesIn(region, mesh, start)});
         try {
-            shell = &shells.add(mesh, description.material, options);
+            bullet::ShellBody& shell = shells.add(mesh, description.material, options);
+            shell.setName(description.name);
+            place(shell, description, start, seed);
+            if (description.flattenRest) shell.shell().flattenRest();
+            applyLoads(shell.shell(), description);
         } catch (const std::invalid_argument& error) {
             throw InputError(description.label + ": " + error.what());
         }
-        shell->setName(description.name);
-        place(*shell, description, startPositions(description, mesh), seed);
-        applyLoads(shell->shell(), description);
+    }
+
+    static std::vector<int> trianglesIn(const Region& region, const TriangleMesh& mesh, const Points& x) {
+        std::vector<int> triangles;
+        for (int t = 0; t < mesh.triangles.cols(); ++t) {
+            const auto c = mesh.triangles.col(t);
+            const Vec3 centre = (x.col(c[0]) + x.col(c[1]) + x.col(c[2])) / 3.0;
+            if ((centre.array() >= region.box.min.array()).all() && (centre.array() <= region.box.max.array()).all())
+                triangles.push_back(t);
+        }
+        if (triangles.empty()) throw InputError(region.label + ".box: no triangle has its centre in this box");
+        return triangles;
     }
 
     void place(bullet::ShellBody& shell, const ShellDescription& description, Points x, std::uint64_t seed) {
@@ -152,6 +172,41 @@ struct World::Impl {
         shell.setVelocity(toBullet(description.initialVelocity));
         for (int i = 0; i < x.cols(); ++i)
             if (isPinned[i]) shell.pin(i);
+        for (const Guide& guide : description.guides)
+            for (const int vertex : guide.where.vertices(x)) shell.shell().guide(vertex, guide.direction);
+        for (const Clamp& clamp : description.clamps) {
+            try {
+                shell.shell().clamp(clamp.where.vertices(x), clamp.direction);
+            } catch (const std::invalid_argument& error) {
+                throw InputError(clamp.where.label + ": " + error.what());
+            }
+        }
+    }
+
+    /// Everything to its equilibrium, without time.
+    void settle(FrameReport& report) {
+        using Clock = std::chrono::steady_clock;
+        const auto start = Clock::now();
+        for (int k = 0; k < shells.size(); ++k) {
+            const StaticReport done =
+                shells[k].settle(world.getGravity(), {.increments = scene.loadIncrements, .maxIterations = 200});
+            report.converged = report.converged && done.converged;
+            report.solves += done.iterations;
+            report.dents.emplace_back();
+        }
+        report.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    }
+
+    void noteDents(FrameReport& report) {
+        report.dents.resize(shells.size());
+        for (int k = 0; k < shells.size(); ++k) {
+            const Dent& dent = shells[k].shell().lastDent();
+            Dent& most = report.dents[k];
+            if (dent.triangle < 0) continue;
+            const double sum = most.work + dent.work;
+            if (most.triangle < 0 || dent.elements > most.elements) most = dent;
+            most.work = sum;
+        }
     }
 
     void applyLoads(Shell& shell, const ShellDescription& description) {
@@ -167,10 +222,14 @@ struct World::Impl {
     /// Puts kinematic bodies where they are at the end of the coming step; Bullet takes their velocity from that.
     void moveKinematicBodies(double end) {
         for (Body& body : bodies) {
-            if (!body.description->kinematic) continue;
-            const Kinematic& motion = *body.description->kinematic;
+            if (body.description->kinematic.empty()) continue;
             const Transform& start = body.description->transform;
-            const Vec3 origin = start.position + std::min(end, motion.until) * motion.velocity;
+            Vec3 origin = start.position;
+            double begun = 0.0;
+            for (const auto& [velocity, until] : body.description->kinematic) {
+                origin += std::max(0.0, std::min(end, until) - begun) * velocity;
+                begun = until;
+            }
             btTransform pose = body.body->getWorldTransform();
             pose.setOrigin(toBullet(Vec3(origin + start.rotation() * body.centre)));
             body.body->setWorldTransform(pose);
@@ -192,6 +251,7 @@ struct World::Impl {
         report.solves += last.solves;
         report.converged = report.converged && last.converged;
         report.finite = report.finite && last.finite;
+        noteDents(report);
     }
 
     BodyState state(const Body& body) const {
@@ -225,7 +285,10 @@ World::~World() = default;
 
 FrameReport World::step() {
     FrameReport report;
-    for (int i = 0; i < scene().substeps; ++i) m_impl->step(report);
+    if (scene().isStatic)
+        m_impl->settle(report);
+    else
+        for (int i = 0; i < scene().substeps; ++i) m_impl->step(report);
     return report;
 }
 

@@ -1,7 +1,10 @@
 #include "jacket/Island.h"
 
+#include <Eigen/Cholesky>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "ShellAssembly.h"
@@ -10,6 +13,8 @@
 
 namespace jacket {
 namespace {
+
+constexpr double kEnergyGain = 0.02;  ///< of a step that is one too many: see energyGain
 
 /// From a body's centre of mass to where the shell touches it, at the start of the step.
 Vec3 contactArm(const IslandInput& input, const Contact& contact) {
@@ -41,6 +46,8 @@ struct IslandSolver::Impl {
     void beginTwoStep(const IslandInput& input, std::size_t shell);
     void assemble(const IslandInput& input, bool atEnd);
     bool overstretches(const IslandInput& input) const;
+    double energyGain(const IslandInput& input) const;
+    void limitDeformation(const IslandInput& input, StepReport& report);
     bool improves(const IslandInput& input, const Points& before);
     double incrementalPotential(const IslandInput& input, const Points& velocities) const;
     void solveStep(const IslandInput& input, StepReport& report);
@@ -121,6 +128,8 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
         return shell->settings().integrator == Integrator::Newton;
     });
     const int most = toTheEnd ? kMostToTheEnd : kMostNewtonSteps;
+    Points calmest;  // linearised there the step gained least
+    double leastGain = std::numeric_limits<double>::infinity();
     assemble(input, false);
     for (int newton = 1;; ++newton) {
         const Points before = v;
@@ -128,12 +137,19 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
         if (!unfiltered.allFinite()) return;
         const bool goOn = toTheEnd ? newton == 1 || improves(input, before) : overstretches(input);
         if (!goOn) return;
-        if (newton == most) {
-            report.converged = report.converged && !toTheEnd;
-            return;
+        if (const double gain = energyGain(input); gain < leastGain) {
+            leastGain = gain;
+            calmest = newton == 1 ? Points() : before;
         }
+        if (newton == most) break;
         assemble(input, true);
     }
+    report.converged = report.converged && !toTheEnd;
+    if (!(energyGain(input) > std::max(leastGain, kEnergyGain))) return;
+    v = calmest;
+    assemble(input, calmest.cols() > 0);  // back to what threw the shell about least
+    solveRounds(input, report);
+    if (unfiltered.allFinite() && energyGain(input) > kEnergyGain) limitDeformation(input, report);
 }
 
 /// After one more Newton step from velocities `before`: goes back along it until the incremental potential is not above
@@ -174,8 +190,12 @@ double IslandSolver::Impl::incrementalPotential(const IslandInput& input, const 
     return sum;
 }
 
+/// Whether the solved step must be linearised again: it stretches an edge by far, or it gains energy. Backward Euler
+/// itself gains none; its one linear solve does where stiff shells turn far in a step. That is looked for only where
+/// edges change their lengths at all.
 bool IslandSolver::Impl::overstretches(const IslandInput& input) const {
-    constexpr double kMost = 0.1;  // growth of an edge in one step, in rest lengths
+    constexpr double kMost = 0.1, kSuspect = 1e-3;  // change of an edge in one step, in rest lengths
+    bool suspect = false;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         const Points &x = shell.positions(), &rest = shell.restPositions();
@@ -184,9 +204,70 @@ bool IslandSolver::Impl::overstretches(const IslandInput& input) const {
             const Vec3 then = now + stepOf[k] * (v.col(offsets[k] + e.v1) - v.col(offsets[k] + e.v0));
             const double length = (rest.col(e.v1) - rest.col(e.v0)).norm();
             if (then.norm() > std::max(now.norm(), length) + kMost * length) return true;
+            suspect = suspect || std::abs(then.norm() - now.norm()) > kSuspect * length;
         }
     }
-    return false;
+    return suspect && energyGain(input) > kEnergyGain;
+}
+
+/// Where Newton's method does not settle, as in a stiff shell pinched between bodies, the step would throw the shell
+/// about. Its linear and angular momentum are kept then, and of the motion besides that only as much as gains no energy:
+/// it stands stiff for a step. Contacts may give way by that much, until the next step.
+void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& report) {
+    constexpr int kMostHalvings = 12;
+    report.limited = true;
+    Points rigid = Points::Zero(3, v.cols());
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        const Shell& shell = *input.shells[k];
+        if (shell.pinCount() > 0) continue;  // held: no motion as a whole
+        const Eigen::VectorXd& mass = shell.masses();
+        const auto part = v.middleCols(offsets[k], shell.vertexCount());
+        const Vec3 centre = shell.positions() * mass / mass.sum(), mean = part * mass / mass.sum();
+        Mat3 inertia = Mat3::Zero();
+        Vec3 spin = Vec3::Zero();
+        for (int i = 0; i < shell.vertexCount(); ++i) {
+            const Vec3 r = shell.positions().col(i) - centre;
+            inertia += mass[i] * (r.squaredNorm() * Mat3::Identity() - r * r.transpose());
+            spin += mass[i] * r.cross(Vec3(part.col(i)));
+        }
+        const Vec3 omega = inertia.ldlt().solve(spin);
+        for (int i = 0; i < shell.vertexCount(); ++i)
+            rigid.col(offsets[k] + i) = mean + omega.cross(Vec3(shell.positions().col(i) - centre));
+    }
+    for (int halving = 0; halving < kMostHalvings && energyGain(input) > kEnergyGain; ++halving)
+        for (std::size_t k = 0; k < input.shells.size(); ++k)
+            for (int i = 0; i < input.shells[k]->vertexCount(); ++i)
+                if (!input.shells[k]->isPinned(i))
+                    v.col(offsets[k] + i) = 0.5 * (v.col(offsets[k] + i) + rigid.col(offsets[k] + i));
+}
+
+/// What shells and bodies gain in the solved step besides what gravity and forces do, over the energy that they start
+/// with.
+double IslandSolver::Impl::energyGain(const IslandInput& input) const {
+    double atStart = 0.0, gain = 0.0;
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        const Shell& shell = *input.shells[k];
+        const int n = shell.vertexCount();
+        const auto part = v.middleCols(offsets[k], n);
+        const auto before = from.middleCols(offsets[k], n);
+        for (int i = 0; i < n; ++i) {
+            const Vec3 mean = 0.5 * (part.col(i) + before.col(i));
+            const double kinetic = 0.5 * shell.masses()[i] * before.col(i).squaredNorm();
+            const Vec3 load = shell.masses()[i] * input.gravity + shell.forces().col(i);
+            atStart += kinetic;
+            gain += 0.5 * shell.masses()[i] * part.col(i).squaredNorm() - kinetic - stepOf[k] * load.dot(mean);
+        }
+        const double elastic = shell.elasticEnergy(shell.positions());
+        atStart += elastic;
+        gain += shell.elasticEnergy(shell.positions() + y.middleCols(offsets[k], n) + stepOf[k] * part) - elastic;
+    }
+    for (std::size_t b = 0; b < dynamicBodies.size(); ++b) {
+        const CoupledBody& body = input.bodies[dynamicBodies[b]];
+        const double kinetic = 0.5 * body.freeTwist.dot(body.mass * body.freeTwist);
+        atStart += kinetic;
+        gain += 0.5 * u.w.col(b).dot(body.mass * u.w.col(b)) - kinetic;
+    }
+    return gain / std::max(atStart, 1e-300);
 }
 
 void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {

@@ -23,10 +23,31 @@ ShellSettings settingsOf(const ShellOptions& o) {
             .plasticity = o.plasticity};
 }
 
+std::vector<ShellMaterial> materialsOf(const ShellMaterial& material, const ShellOptions& options) {
+    std::vector<ShellMaterial> materials{material};
+    for (const auto& region : options.regions) materials.push_back(region.material);
+    return materials;
+}
+
+/// Per triangle: 0 the shell's material, k the k-th region's.
+std::vector<int> regionOfTriangles(const TriangleMesh& mesh, const ShellOptions& options) {
+    if (options.regions.empty()) return {};
+    const int count = static_cast<int>(mesh.triangles.cols());
+    std::vector<int> result(count, 0);
+    for (std::size_t k = 0; k < options.regions.size(); ++k)
+        for (const int t : options.regions[k].triangles) {
+            if (t < 0 || t >= count)
+                throw std::invalid_argument("ShellOptions.regions: triangle must be 0.." + std::to_string(count - 1) +
+                                            ", got " + std::to_string(t));
+            result[t] = static_cast<int>(k) + 1;
+        }
+    return result;
+}
+
 }  // namespace
 
 ShellBody::ShellBody(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options)
-    : m_shell(mesh, material, settingsOf(options)),
+    : m_shell(mesh, materialsOf(material, options), regionOfTriangles(mesh, options), settingsOf(options)),
       m_options(options),
       m_contactThickness(options.contactThickness < 0.0 ? 0.5 * material.thickness : options.contactThickness),
       m_positions(mesh.positions.cols()),
@@ -59,6 +80,17 @@ void ShellBody::movePin(int vertex, const btVector3& target) {
 }
 void ShellBody::unpin(int vertex) {
     m_shell.unpin(vertex);
+}
+
+void ShellBody::clamp(const std::vector<int>& vertices, std::optional<btVector3> direction) {
+    m_shell.clamp(vertices, direction ? std::optional(fromBullet(*direction)) : std::nullopt);
+}
+
+StaticReport ShellBody::settle(const btVector3& gravity, const StaticSettings& settings) {
+    const StaticReport report = jacket::settle(m_shell, fromBullet(gravity), settings);
+    m_hasVelocity = false;
+    publish();
+    return report;
 }
 
 void ShellBody::anchor(int vertex, btRigidBody& body) {

@@ -62,6 +62,12 @@ struct DihedralBending {
         return result;
     }
 
+    template <class = void>
+    double energy(const Stencil<4>& x, const Rest& r) const {
+        const double bend = wrapped(Shape(x, r.length).angle() - r.angle);
+        return 0.5 * r.weight * bend * bend;
+    }
+
     /// Bending beyond the limit stays: the isotropic rule of O'Brien et al. 2002 with linear hardening, on the curvature
     /// e = l / (A0 + A1) (theta - theta0), `accumulated` in 1/m.
     template <class = void>

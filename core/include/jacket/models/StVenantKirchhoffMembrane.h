@@ -125,6 +125,14 @@ struct StVenantKirchhoffMembrane {
         return result;
     }
 
+    template <class = void>
+    double energy(const Stencil<3>& x, const Rest& r) const {
+        const Eigen::Matrix<double, 3, 2> F =
+            (x.col(1) - x.col(0)) * r.inverseFrame.row(0) + (x.col(2) - x.col(0)) * r.inverseFrame.row(1);
+        const Mat2 e = 0.5 * (F.transpose() * F - Mat2::Identity());
+        return 0.5 * stressOf(e, r).cwiseProduct(e).sum();
+    }
+
     /// Area times thickness times stress S that the strain's first-order change along dx leads to from x [N m].
     template <class = void>
     Mat2 predictedStress(const Stencil<3>& x, const Stencil<3>& dx, const Rest& r) const {

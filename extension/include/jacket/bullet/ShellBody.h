@@ -2,15 +2,23 @@
 #include <LinearMath/btVector3.h>
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "jacket/Shell.h"
+#include "jacket/Statics.h"
 
 class btRigidBody;
 
 namespace jacket::bullet {
+
+/// Some of a shell's triangles, of another material than the rest.
+struct ShellRegion {
+    ShellMaterial material;
+    std::vector<int> triangles;
+};
 
 /// How a shell behaves in a Bullet world; the defaults are what most scenes want.
 struct ShellOptions {
@@ -18,6 +26,7 @@ struct ShellOptions {
     BendingModel bending = PatchBending{};
     Integrator integrator = Integrator::BackwardEuler;
     bool plasticity = false;         ///< keep bends and stretches beyond the material's yield stress
+    std::vector<ShellRegion> regions{};  ///< later ones win where they overlap
     double tolerance = 1e-3;         ///< of the linear solve, relative
     int maxIterations = 1000;        ///< of one linear solve
     double friction = 0.5;           ///< multiplied with the body's, as Bullet does [-]
@@ -46,6 +55,11 @@ class ShellBody {
     void pin(int vertex);
     void movePin(int vertex, const btVector3& target);
     void unpin(int vertex);
+    /// Pins an edge together with its tangent: see Shell::clamp.
+    void clamp(const std::vector<int>& vertices, std::optional<btVector3> direction = {});
+    /// Moves the shell to its equilibrium under gravity, its forces and pressure, as held, without bodies: see
+    /// jacket/Statics.h.
+    StaticReport settle(const btVector3& gravity, const StaticSettings& settings = {});
     /// Ties a vertex to a body at their present distance. The body may be removed at any time, which frees the vertex.
     void anchor(int vertex, btRigidBody& body);
 
