@@ -146,7 +146,7 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
     }
     report.converged = report.converged && !toTheEnd;
     if (!(energyGain(input) > std::max(leastGain, kEnergyGain))) return;
-    v = calmest;
+    if (calmest.cols() > 0) v = calmest;
     assemble(input, calmest.cols() > 0);  // back to what threw the shell about least
     solveRounds(input, report);
     if (unfiltered.allFinite() && energyGain(input) > kEnergyGain) limitDeformation(input, report);
