@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "jacket/Shell.h"
 #include "support/SheetMeshes.h"
@@ -112,6 +114,50 @@ TEST(Integrators, OrderOfAccuracyOfASwingingStrip) {
     EXPECT_NEAR(order(Integrator::Newton, 1.0), 1.0, 0.15);
     EXPECT_GT(order(Integrator::Bdf2, 1.0), 1.7);
     EXPECT_GT(order(Integrator::Bdf2, 1.5), 1.7);  // steps of unequal length
+}
+
+TEST(AdaptiveStep, HalvesWhereASheetIsPulledTightAndGrowsAgain) {
+    // A slack sheet falls freely until its pinned corners stop it: only then are short steps of use.
+    const TriangleMesh mesh = sheet(MeshKind::OneDiagonal, 1.0, 1.0, 10, 10);
+    Shell shell(mesh, {.young = 1e7, .poisson = 0.3, .thickness = 1e-3, .density = 1000.0}, {.tolerance = 1e-4});
+    for (const int corner : {0, 10}) shell.pin(corner);
+    Points v = Points::Zero(3, shell.vertexCount());
+    v.row(0).setConstant(2.0);
+    shell.setVelocities(v);
+    AdaptiveStep control{.mostStrain = 0.02, .shortest = 2e-4};
+    AdaptiveReport all;
+    double peak = 0.0;
+    std::vector<double> lengths;
+    for (int frame = 0; frame < 60; ++frame) {
+        const AdaptiveReport report = shell.stepAdaptively(1.0 / 60.0, Vec3(0, 0, -9.81), control);
+        ASSERT_TRUE(report.finite);
+        all.steps += report.steps;
+        all.rejected += report.rejected;
+        lengths.push_back(report.shortest);
+        peak = std::max(peak, shell.maxStretch());
+    }
+    EXPECT_GT(all.rejected, 0);
+    EXPECT_LT(*std::min_element(lengths.begin(), lengths.end()), 0.3 / 60.0);
+    EXPECT_GT(lengths.back(), 1.9 * *std::min_element(lengths.begin(), lengths.end()));  // grew again
+    Shell fixed(mesh, shell.material(), shell.settings());
+    for (const int corner : {0, 10}) fixed.pin(corner);
+    fixed.setVelocities(v);
+    double fixedPeak = 0.0;
+    for (int frame = 0; frame < 60; ++frame) {
+        fixed.step(1.0 / 60.0, Vec3(0, 0, -9.81));
+        fixedPeak = std::max(fixedPeak, fixed.maxStretch());
+    }
+    EXPECT_LT(peak, fixedPeak);  // what the short steps are for
+}
+
+TEST(AdaptiveStep, DoesNothingToACalmShell) {
+    const TriangleMesh mesh = sheet(MeshKind::OneDiagonal, 1.0, 1.0, 6, 6);
+    Shell shell(mesh, {.young = 1e7, .poisson = 0.3, .thickness = 1e-3, .density = 1000.0});
+    AdaptiveStep control;
+    const AdaptiveReport report = shell.stepAdaptively(0.1, Vec3(0, 0, -9.81), control);
+    EXPECT_EQ(report.steps, 1);
+    EXPECT_EQ(report.rejected, 0);
+    EXPECT_THROW(shell.stepAdaptively(0.0, Vec3::Zero(), control), std::invalid_argument);
 }
 
 TEST(Integrators, AFreeSpinningShellKeepsItsMomentum) {

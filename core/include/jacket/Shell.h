@@ -58,6 +58,22 @@ struct Dent {
     int elements = 0;               ///< hinges or patches, and triangles in their plane, that yielded
 };
 
+/// How long steps may be that choose their length themselves: a step is taken back and halved where it strains an edge
+/// or gains energy by more than this, and lengthened again after four that were not.
+struct AdaptiveStep {
+    double mostStrain = 0.02;      ///< change of an edge's length over its rest length, in one step [-]
+    double mostEnergyGain = 0.01;  ///< of kinetic plus elastic energy, in one step, besides what gravity and forces give
+    double shortest = 1e-6;        ///< taken whatever it does [s]
+    double next = 0.0;             ///< length to try next; 0: all at once [s]
+    int quiet = 0;                 ///< steps since the last rejection or change
+};
+
+struct AdaptiveReport {
+    int steps = 0, rejected = 0;
+    double shortest = 0.0;  ///< [s]
+    bool finite = true;     ///< false: stopped at a step that was not, before the duration's end
+};
+
 /// One shell: rest shape, state, and how it is held. Positions and velocities are in the vertex order of the mesh.
 class Shell {
   public:
@@ -136,6 +152,9 @@ class Shell {
 
     /// One step without bodies or contacts: solve for velocities, then move.
     StepReport step(double h, const Vec3& gravity, const Wind* wind = nullptr);
+    /// Steps over a duration [s] in as many steps as `control` asks for, without bodies.
+    AdaptiveReport stepAdaptively(double duration, const Vec3& gravity, AdaptiveStep& control,
+                                  const Wind* wind = nullptr);
     /// Moves every vertex by h v, after a solve.
     void advance(double h);
     /// Puts a vertex somewhere without touching its velocity: for contacts carried along by their body.
