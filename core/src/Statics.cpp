@@ -50,7 +50,7 @@ class StaticSolver {
     bool isDescent(const Eigen::VectorXd& step) const { return step.allFinite() && step.dot(m_force) > 0.0; }
     double potential(double load) const;
     void move(const Eigen::VectorXd& step, double by);
-    double largestForce(double load) const;
+    double largestForce(double load);
 
     Shell& m_shell;
     Vec3 m_gravity;
@@ -60,6 +60,7 @@ class StaticSolver {
     Sparse m_matrix;
     Eigen::VectorXd m_force;  ///< unbalanced, on the free coordinates [N]
     Eigen::SimplicialLDLT<Sparse> m_factor;
+    double m_largestForce = 1e-300;  ///< [N]
 };
 
 void StaticSolver::assemble(double load, HessianKind kind) {
@@ -115,14 +116,16 @@ void StaticSolver::move(const Eigen::VectorXd& step, double by) {
         m_shell.m_x.col(i) += by * (m_basis[i] * step.segment(m_offsets[i], m_basis[i].cols()));
 }
 
-/// What residuals are compared with: the largest load or inner force on a vertex.
-double StaticSolver::largestForce(double load) const {
-    double most = 0.0;
+/// What residuals are compared with: the largest load or inner force on a vertex so far, as a released shell has none at
+/// the end.
+double StaticSolver::largestForce(double load) {
+    double most = m_largestForce;
     const Points inner = m_shell.elasticForces();
     for (int i = 0; i < m_shell.vertexCount(); ++i) {
         most = std::max(most, load * (m_shell.m_mass[i] * m_gravity + m_shell.m_force.col(i)).norm());
         most = std::max(most, inner.col(i).norm());
     }
+    m_largestForce = most;
     return most;
 }
 
@@ -139,7 +142,7 @@ bool StaticSolver::balanceMixed(double load, const StaticSettings& settings, Sta
         assemble(load, HessianKind::Exact);
         report.residual = m_force.cwiseAbs().maxCoeff();
         if (first < 0.0) first = report.residual;
-        settled = iteration > 0 && report.residual <= settings.tolerance * std::max(largestForce(load), 1e-300);
+        settled = iteration > 0 && report.residual <= settings.tolerance * largestForce(load);
         if (settled || !(report.residual < kDiverged * std::max(first, largestForce(load)))) break;
         m_factor.compute(m_matrix);
         if (m_factor.info() != Eigen::Success) break;
@@ -166,7 +169,7 @@ bool StaticSolver::balanceByEnergy(double load, const StaticSettings& settings, 
         ++report.iterations;
         Eigen::VectorXd step = newtonStep(load);
         report.residual = m_force.cwiseAbs().maxCoeff();
-        if (report.residual <= settings.tolerance * std::max(largestForce(load), 1e-300)) return true;
+        if (report.residual <= settings.tolerance * largestForce(load)) return true;
         if (!step.allFinite()) return false;
         const double longest = step.cwiseAbs().maxCoeff();
         if (longest > 2.0 * edge) step *= 2.0 * edge / longest;  // beyond that the quadratic model says nothing
@@ -185,6 +188,7 @@ bool StaticSolver::balanceByEnergy(double load, const StaticSettings& settings, 
 
 bool StaticSolver::balance(double load, const StaticSettings& settings, StaticReport& report, bool patient) {
     const Points start = m_shell.m_x;
+    largestForce(load);
     if (balanceMixed(load, settings, report)) return true;
     m_shell.m_x = start;
     if (patient && balanceByEnergy(load, settings, report)) return true;
