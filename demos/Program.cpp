@@ -18,6 +18,7 @@ constexpr const char* kExamples =
     "  jacket run my_scene.json --set shells.sheet.material.thickness=2e-3\n"
     "  jacket check hood.obj                                    what is wrong with a mesh\n"
     "  jacket material denim                                    what a preset means\n"
+    "  jacket report --quick --out out/report                   which settings are cheapest for an error\n"
     "\n"
     "Exit codes: 0 ok, 2 bad input, 3 not converged, 4 not finite.";
 
@@ -52,6 +53,7 @@ int runProgram(int argc, const char* const* argv) {
         addRunCommand(app, exitCode);
         addCheckCommand(app, exitCode);
         addMaterialCommand(app, exitCode);
+        addReportCommand(app, exitCode);
         checkCommand(app, argc, argv);
         app.parse(argc, argv);
         return exitCode;

@@ -26,20 +26,20 @@ fs::path sibling(const fs::path& place, const std::string& what) {
 
 }  // namespace
 
-void OutputDirectory::requireFree(const fs::path& place) {
+void OutputDirectory::requireFree(const fs::path& place, const std::string& marker) {
     const fs::path path = normalised(place);
     if (path == path.root_path()) throw InputError("--out " + place.string() + ": is no place for results");
     if (!fs::exists(fs::symlink_status(path))) return;
     if (!fs::is_directory(path))
         throw InputError("--out " + place.string() + ": is there already and is not a directory");
-    if (!fs::is_empty(path) && !fs::exists(path / "result.json"))
+    if (!fs::is_empty(path) && !fs::exists(path / marker))
         throw InputError("--out " + place.string() +
-                         ": is there already and holds no result.json; only an earlier result is replaced");
+                         ": is there already and holds no " + marker + "; only an earlier result is replaced");
 }
 
-OutputDirectory::OutputDirectory(const fs::path& place)
+OutputDirectory::OutputDirectory(const fs::path& place, const std::string& marker)
     : m_place(normalised(place)), m_folder(sibling(m_place, "partial")) {
-    requireFree(place);
+    requireFree(place, marker);
     std::error_code error;
     fs::remove_all(m_folder, error);
     if (!fs::create_directories(m_folder, error))

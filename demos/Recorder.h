@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 #include <fstream>
+#include <string>
 #include <vector>
 
 #include "Measure.h"
@@ -12,14 +13,15 @@ namespace jacket::demo {
 /// destructor removes unless commit() has moved it there.
 class OutputDirectory {
   public:
-    /// Throws InputError when the place is taken by anything but an empty directory or an earlier result.
-    explicit OutputDirectory(const std::filesystem::path& place);
+    /// Throws InputError when the place is taken by anything but an empty directory or an earlier result, which is one
+    /// that holds a file named `marker`.
+    explicit OutputDirectory(const std::filesystem::path& place, const std::string& marker = "result.json");
     ~OutputDirectory();
     OutputDirectory(const OutputDirectory&) = delete;
     OutputDirectory& operator=(const OutputDirectory&) = delete;
 
     /// What the constructor asks, without touching anything.
-    static void requireFree(const std::filesystem::path& place);
+    static void requireFree(const std::filesystem::path& place, const std::string& marker = "result.json");
 
     const std::filesystem::path& folder() const { return m_folder; }  ///< where to write until commit()
     const std::filesystem::path& place() const { return m_place; }
