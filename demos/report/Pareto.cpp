@@ -32,16 +32,24 @@ std::vector<int> paretoFront(std::span<const Trial> trials) {
     return front;
 }
 
-bool isReliable(std::span<const Trial> trials, int index, double accepted) {
-    return std::all_of(trials.begin(), trials.end(), [&](const Trial& other) {
-        return !isAtLeastAsFine(other, trials[index]) || other.error <= accepted;
-    });
+double reliableError(std::span<const Trial> trials, int index) {
+    double largest = 0.0;
+    for (const Trial& other : trials)
+        if (isAtLeastAsFine(other, trials[index])) largest = std::max(largest, other.error);
+    return largest;
 }
 
 int cheapestWithin(std::span<const Trial> trials, double accepted) {
     int best = -1;
     for (int i = 0; i < static_cast<int>(trials.size()); ++i)
-        if (isReliable(trials, i, accepted) && (best < 0 || trials[i].cost < trials[best].cost)) best = i;
+        if (reliableError(trials, i) <= accepted && (best < 0 || trials[i].cost < trials[best].cost)) best = i;
+    return best;
+}
+
+int mostExact(std::span<const Trial> trials) {
+    int best = -1;
+    for (int i = 0; i < static_cast<int>(trials.size()); ++i)
+        if (best < 0 || reliableError(trials, i) < reliableError(trials, best)) best = i;
     return best;
 }
 

@@ -16,11 +16,13 @@ struct Trial {
 /// Indices of the trials that no other beats in both error and cost, by rising cost.
 std::vector<int> paretoFront(std::span<const Trial> trials);
 
-/// True when no trial of its family that is at least as fine has a larger error than `accepted`, so that the trial is not
-/// within it by errors that happen to cancel.
-bool isReliable(std::span<const Trial> trials, int index, double accepted);
+/// The largest error of a trial and of all of its family that are at least as fine. A trial whose errors happen to cancel
+/// is not taken for an exact one by that.
+double reliableError(std::span<const Trial> trials, int index);
 
-/// Index of the cheapest trial that is reliably within the error; -1 when there is none.
+/// Index of the cheapest trial whose reliable error is within the accepted one; -1 when there is none.
 int cheapestWithin(std::span<const Trial> trials, double accepted);
+/// Index of the trial with the least reliable error; -1 without trials.
+int mostExact(std::span<const Trial> trials);
 
 }  // namespace jacket::demo::report

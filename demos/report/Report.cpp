@@ -120,12 +120,9 @@ std::vector<Choice> choose(const std::string& name, std::span<const Trial> trial
     for (const double accepted : kAcceptedErrors) {
         int best = cheapestWithin(trials, accepted);
         const bool isReached = best >= 0;
-        if (!isReached && !trials.empty())
-            best = static_cast<int>(std::min_element(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) {
-                                        return a.error < b.error;
-                                    }) - trials.begin());
+        if (!isReached) best = mostExact(trials);
         if (best < 0) continue;
-        choices.push_back({.problem = name, .accepted = accepted, .isReached = isReached, .error = trials[best].error,
+        choices.push_back({.problem = name, .accepted = accepted, .isReached = isReached, .error = reliableError(trials, best),
                            .cost = trials[best].cost, .statics = {}, .motion = {}});
         index.push_back(best);
     }

@@ -56,7 +56,7 @@ struct Choice {
     std::string problem;
     double accepted = 0.0;
     bool isReached = false;
-    double error = 0.0, cost = 0.0;  ///< of that way; when none is reached, of the one with the least error
+    double error = 0.0, cost = 0.0;  ///< reliable error of that way; when none is reached, of the most exact one
     StaticRow statics;               ///< that way, of a settled shape; of many problems, one of the rows
     MotionRow motion;                ///< that way, of a motion
 };

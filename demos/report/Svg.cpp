@@ -185,7 +185,7 @@ LogRange logRangeOf(const std::vector<double>& values) {
 }
 
 std::string percent(double part) {
-    return format("%.3g %%", 100 * part);
+    return 100 * part < 999.5 ? format("%.3g %%", 100 * part) : format("%.0f %%", 100 * part);
 }
 
 std::string duration(double seconds) {
