@@ -2,7 +2,7 @@
 
 /// Where the tip of the heavy strip of Motion.cpp is, 30 times a second: x, y [m] from the clamp. With patch bending on
 /// 80 x 20 cells with alternating diagonals, BDF2 with every step solved to the end by Newton's method, step 1/960 s,
-/// tolerance 1e-5. `jacket report --reference` comes to the same with one linear solve a step and far shorter steps.
+/// tolerance 1e-5. One linear solve a step, at 1/4800 s, comes within 0.001 of it.
 namespace jacket::demo::accuracy {
 
 inline constexpr double kStripSeconds = 1.0;
