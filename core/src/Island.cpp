@@ -121,11 +121,12 @@ void IslandSolver::Impl::beginTwoStep(const IslandInput& input, std::size_t k) {
 
 /// One linear solve, as Baraff & Witkin have it. Only where it has stretched an edge far beyond what it was, which the
 /// linearisation at the start did not see coming (an unstressed sheet resists no motion out of its plane), it is
-/// linearised again at the end that it found. Integrator::Newton goes on until the velocities no longer change.
+/// linearised again at the end that it found. The other integrators go on until the
+/// velocities no longer change: one linearisation would cost BDF2 its second order wherever a shell turns far.
 void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report) {
     constexpr int kMostNewtonSteps = 5, kMostToTheEnd = 30;
     const bool toTheEnd = std::any_of(input.shells.begin(), input.shells.end(), [](const Shell* shell) {
-        return shell->settings().integrator == Integrator::Newton;
+        return shell->settings().integrator != Integrator::BackwardEuler;
     });
     const int most = toTheEnd ? kMostToTheEnd : kMostNewtonSteps;
     Points calmest;  // linearised there the step gained least

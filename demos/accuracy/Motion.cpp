@@ -214,7 +214,7 @@ std::span<const MotionProblem> motionProblems() {
 }
 
 std::string computeStripReference() {
-    MotionCase finest{.integrator = Integrator::Bdf2, .dt = 1.0 / 9600, .tolerance = 1e-5,
+    MotionCase finest{.integrator = Integrator::Bdf2, .dt = 1.0 / 960, .tolerance = 1e-5,
                       .mesh = MeshKind::Alternating, .cells = 80};
     Strip strip = heavyStripFor(finest);
     std::string text = "inline constexpr double kStripTip[][2] = {";

@@ -1,38 +1,14 @@
 #include "MotionMesh.h"
 
+#include "SheetMeshes.h"
+
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <random>
 
 namespace jacket::demo::accuracy {
 
 namespace {
-
-double angleAt(const Points& x, int apex, int p, int q) {
-    const Vec3 a = x.col(p) - x.col(apex), b = x.col(q) - x.col(apex);
-    return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
-/// Flips edges of a flat mesh until every one is locally Delaunay (Lawson).
-void makeDelaunay(TriangleMesh& mesh) {
-    for (bool changed = true; changed;) {
-        changed = false;
-        const HalfEdgeMesh connectivity(mesh.triangles, static_cast<int>(mesh.positions.cols()));
-        std::vector<char> touched(mesh.triangles.cols(), 0);
-        for (const auto& hinge : connectivity.hinges()) {
-            const auto& edge = connectivity.edges()[hinge.edge];
-            const int t0 = edge.halfEdge / 3, t1 = edge.twin / 3;
-            const auto [a, b, c, d] = hinge.vertices;
-            const double sum = angleAt(mesh.positions, c, a, b) + angleAt(mesh.positions, d, a, b);
-            if (touched[t0] || touched[t1] || sum <= std::numbers::pi + 1e-9) continue;
-            mesh.triangles.col(t0) << a, d, c;
-            mesh.triangles.col(t1) << d, b, c;
-            touched[t0] = touched[t1] = 1;
-            changed = true;
-        }
-    }
-}
 
 /// Moves inner vertices at random, those of the outline along it. The same mesh in every run.
 void shake(Points& x, const Vec2& size, const Eigen::Vector2i& cells, int straightColumns) {

@@ -23,7 +23,7 @@ enum class Preconditioner { BlockJacobi, IncompleteCholesky };
 enum class Integrator {
     BackwardEuler,  ///< one linear solve a step (Baraff & Witkin 1998), linearised again only where edges overstretch
     Newton,         ///< backward Euler solved to the end: Newton's method with a line search on the incremental potential
-    Bdf2,           ///< second order, variable step, little damping; near bodies a step is one of backward Euler
+    Bdf2,           ///< Newton too, but second order, variable step, little damping; near bodies as Newton
 };
 
 /// How a shell is modelled and solved; the defaults are what most scenes want.
