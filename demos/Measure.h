@@ -8,7 +8,7 @@ namespace jacket::demo {
 struct EnergyBalance {
     double kinetic = 0.0, membrane = 0.0, bending = 0.0;
     double plasticWork = 0.0;  ///< turned into heat since the start; not part of the total
-    double potential = 0.0;  ///< in the field of gravity, 0 at the origin
+    double potential = 0.0;    ///< in the field of gravity, 0 at the origin
     double total() const { return kinetic + membrane + bending + potential; }
 };
 

@@ -33,8 +33,8 @@ void OutputDirectory::requireFree(const fs::path& place, const std::string& mark
     if (!fs::is_directory(path))
         throw InputError("--out " + place.string() + ": is there already and is not a directory");
     if (!fs::is_empty(path) && !fs::exists(path / marker))
-        throw InputError("--out " + place.string() +
-                         ": is there already and holds no " + marker + "; only an earlier result is replaced");
+        throw InputError("--out " + place.string() + ": is there already and holds no " + marker +
+                         "; only an earlier result is replaced");
 }
 
 OutputDirectory::OutputDirectory(const fs::path& place, const std::string& marker)
@@ -83,13 +83,15 @@ void writeObj(const fs::path& path, const Shell& shell) {
 }
 
 constexpr const char* kLogHeader =
-    "frame,time_s,kinetic_J,membrane_J,bending_J,plastic_work_J,potential_J,total_J,momentum_x_Ns,momentum_y_Ns,momentum_z_Ns,"
+    "frame,time_s,kinetic_J,membrane_J,bending_J,plastic_work_J,potential_J,total_J,momentum_x_Ns,momentum_y_Ns,"
+    "momentum_z_Ns,"
     "contacts,pcg_iterations,solves,max_stretch,penetration_m,ms\n";
 
 std::string logLine(const FrameRecord& r) {
     char line[512];
-    std::snprintf(line, sizeof line, "%d,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.12g,%.12g,%.12g,%d,%d,%d,%.6g,%.6g,%.4g\n",
-                  r.frame, r.time, r.energy.kinetic, r.energy.membrane, r.energy.bending, r.energy.plasticWork, r.energy.potential,
+    std::snprintf(line, sizeof line,
+                  "%d,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.12g,%.12g,%.12g,%d,%d,%d,%.6g,%.6g,%.4g\n", r.frame, r.time,
+                  r.energy.kinetic, r.energy.membrane, r.energy.bending, r.energy.plasticWork, r.energy.potential,
                   r.energy.total(), r.momentum.x(), r.momentum.y(), r.momentum.z(), r.report.contacts,
                   r.report.pcgIterations, r.report.solves, r.maxStretch, r.penetration.depth, 1e3 * r.report.seconds);
     return line;

@@ -74,7 +74,8 @@ int makeReport(const ReportOptions& options) {
         directory->commit();
     }
     if (!directory || !options.quiet) report::printCheapest(std::cout, result);
-    if (directory && !options.quiet) std::cout << "Tables and plots: " << (fs::path(options.out) / "index.html").string() << '\n';
+    if (directory && !options.quiet)
+        std::cout << "Tables and plots: " << (fs::path(options.out) / "index.html").string() << '\n';
     return kOk;
 }
 

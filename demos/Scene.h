@@ -111,7 +111,7 @@ struct BodyDescription {
     Vec3 velocity = Vec3::Zero();         ///< [m/s]
     Vec3 angularVelocity = Vec3::Zero();  ///< [rad/s]
     double friction = 0.5;                ///< [-]
-    std::vector<Kinematic> kinematic;  ///< phases, in order of time; empty: not kinematic
+    std::vector<Kinematic> kinematic;     ///< phases, in order of time; empty: not kinematic
 };
 
 struct ProbeDescription {

@@ -14,9 +14,9 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-constexpr std::array kSceneKeys{"name",    "description", "dt",     "substeps", "seconds", "seed",  "mode",
-                                "load_increments",
-                                "gravity", "wind",        "shells", "bodies",   "probes",  "camera"};
+constexpr std::array kSceneKeys{"name",   "description",     "dt",      "substeps", "seconds", "seed",
+                                "mode",   "load_increments", "gravity", "wind",     "shells",  "bodies",
+                                "probes", "camera"};
 constexpr std::array kShellKeys{"name",
                                 "mesh",
                                 "initial_shape",

@@ -144,9 +144,15 @@ Json toJson(const CameraDescription& camera) {
 }  // namespace
 
 Json toJson(const Scene& scene) {
-    Json json{{"name", scene.name}, {"description", scene.description}, {"mode", scene.isStatic ? "static" : "dynamic"},
-              {"dt", scene.dt},     {"substeps", scene.substeps},       {"seconds", scene.seconds},
-              {"seed", scene.seed}, {"load_increments", scene.loadIncrements}, {"gravity", toJson(scene.gravity)}};
+    Json json{{"name", scene.name},
+              {"description", scene.description},
+              {"mode", scene.isStatic ? "static" : "dynamic"},
+              {"dt", scene.dt},
+              {"substeps", scene.substeps},
+              {"seconds", scene.seconds},
+              {"seed", scene.seed},
+              {"load_increments", scene.loadIncrements},
+              {"gravity", toJson(scene.gravity)}};
     if (scene.wind) json["wind"] = toJson(*scene.wind);
     json["shells"] = json["bodies"] = json["probes"] = Json::array();
     for (const auto& shell : scene.shells) json["shells"].push_back(toJson(shell));

@@ -94,8 +94,9 @@ struct World::Impl {
             if (probe.where) probe.where->vertices(starts[probe.shell]);  // throws now rather than after the run
         if (scene.wind) shells.setWind(*scene.wind);
         if (scene.isStatic && (!scene.bodies.empty() || scene.wind))
-            throw InputError("mode: \"static\" settles shells under gravity, forces and pressure alone; the scene has " +
-                             std::string(scene.wind ? "wind" : "bodies"));
+            throw InputError(
+                "mode: \"static\" settles shells under gravity, forces and pressure alone; the scene has " +
+                std::string(scene.wind ? "wind" : "bodies"));
     }
 
     void addBody(BodyDescription& description) {

@@ -30,7 +30,7 @@ struct FrameReport {
     int solves = 0;
     bool converged = true, finite = true;
     std::vector<Dent> dents;  ///< of each shell: where it yielded most, and how much in all steps of the frame
-    double seconds = 0.0;  ///< of wall time in stepSimulation
+    double seconds = 0.0;     ///< of wall time in stepSimulation
 };
 
 class World {

@@ -67,10 +67,10 @@ StepReport IslandSolver::solve(const IslandInput& input) {
         throw std::invalid_argument("IslandInput.h [s] must be > 0 and finite");
     Impl& s = *m_impl;
     StepReport report;
-    s.gather(input);                                                      // one numbering for all shells
+    s.gather(input);                                                                  // one numbering for all shells
     s.response.begin(input, {s.offsets, s.dynamicIndex, s.stepOf}, s.expected, s.y);  // contacts at the start, y
-    s.solveStep(input, report);                                           // A, b; filtered PCG until the contacts agree
-    if (!s.u.allFinite() || !s.unfiltered.allFinite()) {                  // state untouched; the caller decides
+    s.solveStep(input, report);                           // A, b; filtered PCG until the contacts agree
+    if (!s.u.allFinite() || !s.unfiltered.allFinite()) {  // state untouched; the caller decides
         report.finite = report.converged = false;
         return report;
     }
@@ -212,8 +212,8 @@ bool IslandSolver::Impl::overstretches(const IslandInput& input) const {
 }
 
 /// Where Newton's method does not settle, as in a stiff shell pinched between bodies, the step would throw the shell
-/// about. Its linear and angular momentum are kept then, and of the motion besides that only as much as gains no energy:
-/// it stands stiff for a step. Contacts may give way by that much, until the next step.
+/// about. Its linear and angular momentum are kept then, and of the motion besides that only as much as gains no
+/// energy: it stands stiff for a step. Contacts may give way by that much, until the next step.
 void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& report) {
     constexpr int kMostHalvings = 12;
     report.limited = true;
@@ -276,10 +276,9 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const int n = input.shells[k]->vertexCount();
         const Points ahead = atEnd ? Points(v.middleCols(offsets[k], n)) : Points();
-        const StepSystem& step =
-            input.shells[k]->m_assembly->assemble(*input.shells[k], stepOf[k], input.gravity, input.wind,
-                                                  from.middleCols(offsets[k], n), y.middleCols(offsets[k], n),
-                                                  atEnd ? &ahead : nullptr);
+        const StepSystem& step = input.shells[k]->m_assembly->assemble(
+            *input.shells[k], stepOf[k], input.gravity, input.wind, from.middleCols(offsets[k], n),
+            y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr);
         parts.push_back({&step.matrix, &step.rhs, offsets[k]});
     }
     std::vector<Mat6> mass;

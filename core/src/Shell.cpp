@@ -29,9 +29,8 @@ void requireMaterials(const std::vector<ShellMaterial>& materials, const std::ve
     for (const auto& material : materials) validate(material);
     if (ofTriangle.empty() && materials.size() == 1) return;
     if (static_cast<int>(ofTriangle.size()) != triangleCount)
-        throw std::invalid_argument("Shell: a material must be named for each of the " +
-                                    std::to_string(triangleCount) + " triangles, got " +
-                                    std::to_string(ofTriangle.size()));
+        throw std::invalid_argument("Shell: a material must be named for each of the " + std::to_string(triangleCount) +
+                                    " triangles, got " + std::to_string(ofTriangle.size()));
     for (std::size_t t = 0; t < ofTriangle.size(); ++t)
         if (ofTriangle[t] < 0 || ofTriangle[t] >= static_cast<int>(materials.size()))
             throw std::invalid_argument("Shell: material of triangle " + std::to_string(t) + " must be 0.." +

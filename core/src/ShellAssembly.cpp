@@ -93,17 +93,16 @@ const StepSystem& ShellAssembly::assembleStatic(const Shell& shell, const Vec3& 
 }
 
 const StepSystem& ShellAssembly::assemble(const Shell& shell, double h, const Vec3& gravity, const Wind* wind,
-                                          const Points& start, const Eigen::Ref<const Points>& y,
-                                          const Points* ahead) {
+                                          const Points& start, const Eigen::Ref<const Points>& y, const Points* ahead) {
     if (ahead) m_end = shell.positions() + h * *ahead + y;
-    m_system.begin(h, shell.material().stiffnessDamping);  // A = 0, b = 0
+    m_system.begin(h, shell.material().stiffnessDamping);                   // A = 0, b = 0
     addEnergies(ahead ? m_end : shell.positions(), HessianKind::Positive);  // A += (h^2 + h beta) K, b += h f
     if (ahead)
         m_system.addAlteration(-h * *ahead);  // b += h^2 K v', linearised at the end
     else if (!y.isZero(0.0))
-        m_system.addAlteration(y);  // b -= h K y
-    addLoads(shell, gravity, 1.0);                                        // b += h f_ext
-    if (wind) addWind(shell, *wind);                                      // A += h D, b += h (f + D v)
+        m_system.addAlteration(y);                                          // b -= h K y
+    addLoads(shell, gravity, 1.0);                                          // b += h f_ext
+    if (wind) addWind(shell, *wind);                                        // A += h D, b += h (f + D v)
     m_system.addMass(shell.masses(), start, shell.material().massDamping);  // A += M, b += M v
     return m_system;
 }

@@ -116,8 +116,8 @@ void StaticSolver::move(const Eigen::VectorXd& step, double by) {
         m_shell.m_x.col(i) += by * (m_basis[i] * step.segment(m_offsets[i], m_basis[i].cols()));
 }
 
-/// What residuals are compared with: the largest load or inner force on a vertex so far, as a released shell has none at
-/// the end.
+/// What residuals are compared with: the largest load or inner force on a vertex so far, as a released shell has none
+/// at the end.
 double StaticSolver::largestForce(double load) {
     double most = m_largestForce;
     const Points inner = m_shell.elasticForces();
@@ -215,7 +215,8 @@ std::vector<double> StaticSolver::frequencies(int count) {
     m_factor.compute(shifted);
     for (int iteration = 0; iteration < kMostIterations; ++iteration) {
         const Eigen::MatrixXd next = m_factor.solve((mass.asDiagonal() * basis).eval());
-        const Eigen::MatrixXd k = next.transpose() * (mass.asDiagonal() * basis), m = next.transpose() * mass.asDiagonal() * next;
+        const Eigen::MatrixXd k = next.transpose() * (mass.asDiagonal() * basis),
+                              m = next.transpose() * mass.asDiagonal() * next;
         const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> ritz(0.5 * (k + k.transpose()), m);
         if (ritz.info() != Eigen::Success) throw std::runtime_error("naturalFrequencies: no convergence");
         basis = next * ritz.eigenvectors();

@@ -20,8 +20,9 @@ double criticalWeight(double poisson) {
 class StripOnEdge {
   public:
     StripOnEdge(const Case& how, double up)
-        : m_up(up), m_shell(makeStrip(how, kLength, kWidth, {.left = 1}),
-                            plateMaterial(1.0, kThickness, how.poisson), {.bending = how.bending}) {
+        : m_up(up),
+          m_shell(makeStrip(how, kLength, kWidth, {.left = 1}), plateMaterial(1.0, kThickness, how.poisson),
+                  {.bending = how.bending}) {
         clampEdge(m_shell, how.bending,
                   verticesWhere(m_shell.restPositions(), [](const Vec3& p) { return p.x() < 1e-9; }));
     }

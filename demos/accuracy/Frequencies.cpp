@@ -10,8 +10,8 @@ namespace jacket::demo::accuracy {
 namespace {
 
 /// The one of the given frequencies that is farthest off.
-Measurement farthestOff(const std::vector<double>& found, std::size_t first, std::span<const double> exact,
-                        double unit, const Stopwatch& watch, const Shell& shell, bool converged) {
+Measurement farthestOff(const std::vector<double>& found, std::size_t first, std::span<const double> exact, double unit,
+                        const Stopwatch& watch, const Shell& shell, bool converged) {
     Measurement result = relative(found.at(first) / unit, exact[0], watch, shell, converged);
     for (std::size_t i = 1; i < exact.size(); ++i)
         result = worse(result, relative(found.at(first + i) / unit, exact[i], watch, shell, converged));

@@ -21,19 +21,20 @@ const Integrator kIntegrators[] = {Integrator::BackwardEuler, Integrator::Newton
 
 /// Poisson's ratio 0, so that a strip bends as a beam does.
 ShellMaterial stripOfStiffness(double bendingStiffness) {
-    return {.young = 12 * bendingStiffness / std::pow(kThickness, 3), .poisson = 0.0, .thickness = kThickness,
+    return {.young = 12 * bendingStiffness / std::pow(kThickness, 3),
+            .poisson = 0.0,
+            .thickness = kThickness,
             .density = kDensity};
 }
 
 Strip stripFor(const MotionCase& motion, double bendingStiffness) {
-    return makeStrip({.length = kLength, .width = kWidth, .cells = motion.cells, .mesh = motion.mesh,
-                      .bending = motion.bending},
-                     stripOfStiffness(bendingStiffness),
-                     {.integrator = motion.integrator, .tolerance = motion.tolerance});
+    return makeStrip(
+        {.length = kLength, .width = kWidth, .cells = motion.cells, .mesh = motion.mesh, .bending = motion.bending},
+        stripOfStiffness(bendingStiffness), {.integrator = motion.integrator, .tolerance = motion.tolerance});
 }
 
-/// Steps a shell and calls sample(k) at the times k / rate, to the end; dt must divide 1 / rate. Fills all of the result
-/// but the error; false when numbers stop being finite.
+/// Steps a shell and calls sample(k) at the times k / rate, to the end; dt must divide 1 / rate. Fills all of the
+/// result but the error; false when numbers stop being finite.
 template <class Sample>
 bool stepShell(Shell& shell, const MotionCase& motion, double simulated, int rate, const Vec3& gravity,
                MotionResult& result, const Sample& sample) {
@@ -65,10 +66,11 @@ MotionResult runHeavyStrip(const MotionCase& motion) {
     MotionResult result;
     Strip strip = heavyStripFor(motion);
     double sum = 0.0;
-    const bool finite = stepShell(strip.shell, motion, kStripSeconds, kStripRate, Vec3(0, -kGravity, 0), result, [&](int k) {
-        const Vec3 tip = meanPosition(strip.shell, strip.tip);
-        sum += std::pow(tip.x() - kStripTip[k - 1][0], 2) + std::pow(tip.y() - kStripTip[k - 1][1], 2);
-    });
+    const bool finite =
+        stepShell(strip.shell, motion, kStripSeconds, kStripRate, Vec3(0, -kGravity, 0), result, [&](int k) {
+            const Vec3 tip = meanPosition(strip.shell, strip.tip);
+            sum += std::pow(tip.x() - kStripTip[k - 1][0], 2) + std::pow(tip.y() - kStripTip[k - 1][1], 2);
+        });
     const double rms = std::sqrt(sum / std::size(kStripTip)) / kLength;
     result.error = finite && std::isfinite(rms) ? rms : std::numeric_limits<double>::infinity();
     return result;
@@ -147,12 +149,17 @@ std::vector<MotionCase> sweepAround(const SweepRange& range, bool quick) {
         for (const BendingModel& bending : {BendingModel(PatchBending{}), hinges[0], hinges[1], hinges[2]})
             for (const int cells : range.cells)
                 if (!quick || cells == range.cells.back())
-                    cases.push_back({.bending = bending, .integrator = Integrator::Bdf2, .dt = dt,
-                                     .mesh = MeshKind::Delaunay, .cells = cells});
+                    cases.push_back({.bending = bending,
+                                     .integrator = Integrator::Bdf2,
+                                     .dt = dt,
+                                     .mesh = MeshKind::Delaunay,
+                                     .cells = cells});
         for (const double tolerance : {1e-2, 1e-4})
             for (const Integrator integrator : kIntegrators)
                 if (!quick || integrator == Integrator::Bdf2)
-                    cases.push_back({.integrator = integrator, .dt = dt, .tolerance = tolerance,
+                    cases.push_back({.integrator = integrator,
+                                     .dt = dt,
+                                     .tolerance = tolerance,
                                      .cells = range.cells[range.cells.size() / 2]});
     }
     return cases;
@@ -189,8 +196,9 @@ std::string nameOf(const BendingModel& bending) {
 
 MotionProblem heavyStrip() {
     return {.name = "heavy strip",
-            .quantity = "tip of a 1 m strip, clamped level and let go (Gamma = 10): RMS distance from its path over 1 s / "
-                        "length",
+            .quantity =
+                "tip of a 1 m strip, clamped level and let go (Gamma = 10): RMS distance from its path over 1 s / "
+                "length",
             .source = kStripSource,
             .simulated = kStripSeconds,
             .sweep = stripSweep,
@@ -214,8 +222,8 @@ std::span<const MotionProblem> motionProblems() {
 }
 
 std::string computeStripReference() {
-    MotionCase finest{.integrator = Integrator::Bdf2, .dt = 1.0 / 960, .tolerance = 1e-5,
-                      .mesh = MeshKind::Alternating, .cells = 80};
+    MotionCase finest{
+        .integrator = Integrator::Bdf2, .dt = 1.0 / 960, .tolerance = 1e-5, .mesh = MeshKind::Alternating, .cells = 80};
     Strip strip = heavyStripFor(finest);
     std::string text = "inline constexpr double kStripTip[][2] = {";
     MotionResult ignored;

@@ -35,10 +35,10 @@ struct MotionResult {
 
 struct MotionProblem {
     std::string name, quantity, source;
-    double simulated = 0.0;                                      ///< [s]
-    std::function<std::vector<MotionCase>(bool quick)> sweep;    ///< what to compare
-    std::string sweepText;                                       ///< which, in words
-    std::function<MotionResult(const MotionCase&)> run;          ///< once
+    double simulated = 0.0;                                    ///< [s]
+    std::function<std::vector<MotionCase>(bool quick)> sweep;  ///< what to compare
+    std::string sweepText;                                     ///< which, in words
+    std::function<MotionResult(const MotionCase&)> run;        ///< once
 };
 
 std::span<const MotionProblem> motionProblems();

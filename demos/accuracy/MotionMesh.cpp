@@ -39,8 +39,8 @@ Strip makeStrip(const StripOptions& options, const ShellMaterial& material, Shel
     const int rowsInWall = knowsClamps ? 0 : 1;
     const double cell = options.length / options.cells, length = options.length + rowsInWall * cell;
     const int across = std::max(2, static_cast<int>(std::lround(options.cells * options.width / options.length)));
-    TriangleMesh mesh = makeSheet(options.mesh, {length, options.width}, {options.cells + rowsInWall, across},
-                                  1 + rowsInWall);
+    TriangleMesh mesh =
+        makeSheet(options.mesh, {length, options.width}, {options.cells + rowsInWall, across}, 1 + rowsInWall);
     mesh.positions.row(0).array() += options.length - 0.5 * length;
 
     settings.bending = options.bending;

@@ -6,8 +6,8 @@
 
 namespace jacket::demo::accuracy {
 
-/// A flat rectangle in the plane y = 0, centred at the origin, normals up. The Delaunay one has its inner vertices moved
-/// by up to 0.3 cells; the first `straightColumns` columns of vertices keep their place along x.
+/// A flat rectangle in the plane y = 0, centred at the origin, normals up. The Delaunay one has its inner vertices
+/// moved by up to 0.3 cells; the first `straightColumns` columns of vertices keep their place along x.
 TriangleMesh makeSheet(MeshKind kind, const Vec2& size, const Eigen::Vector2i& cells, int straightColumns = 1);
 
 /// A strip along x that leaves a wall at x = 0.

@@ -87,8 +87,7 @@ double heightOnShell(const MotionCase& motion, double simulated, MotionResult& r
     const TriangleMesh mesh = makeSheet(motion.mesh, {kSize, kSize}, {motion.cells, motion.cells});
     bullet::ShellBody& sheet = shells.add(
         mesh, sheetMaterial(),
-        {.bending = motion.bending, .integrator = motion.integrator, .tolerance = motion.tolerance,
-         .friction = 0});
+        {.bending = motion.bending, .integrator = motion.integrator, .tolerance = motion.tolerance, .friction = 0});
     for (int i = 0; i < mesh.positions.cols(); ++i)
         if (mesh.positions.col(i).cwiseAbs().maxCoeff() > 0.5 * kSize * (1 - 1e-9)) sheet.pin(i);
     stage.addBall(kBallMass, kRadius, {0, btScalar(kRadius + kThickness), 0});
@@ -109,8 +108,8 @@ double heightOnSoftBody(const MotionCase& motion, double simulated, MotionResult
     info.m_sparsesdf.Initialize();
     const auto a = btScalar(0.5 * kSize);
     const int nodes = motion.cells + 1;
-    btSoftBody* sheet = btSoftBodyHelpers::CreatePatch(info, {-a, 0, -a}, {a, 0, -a}, {-a, 0, a}, {a, 0, a}, nodes,
-                                                       nodes, 0, false);
+    btSoftBody* sheet =
+        btSoftBodyHelpers::CreatePatch(info, {-a, 0, -a}, {a, 0, -a}, {-a, 0, a}, {a, 0, a}, nodes, nodes, 0, false);
     const double cell = kSize / motion.cells;
     for (int i = 0; i < sheet->m_nodes.size(); ++i) {
         const btVector3& x = sheet->m_nodes[i].m_x;
@@ -172,14 +171,16 @@ double trampolineHeight(const MotionCase& motion, double simulated, MotionResult
 
 MotionProblem trampoline() {
     return {.name = "trampoline",
-            .quantity = "height of a 2 kg ball at rest on a 2 x 2 m sheet held at its edges: distance from that of the "
-                        "finest mesh / sag",
+            .quantity =
+                "height of a 2 kg ball at rest on a 2 x 2 m sheet held at its edges: distance from that of the "
+                "finest mesh / sag",
             .source = kTrampolineSource,
             .simulated = kSeconds,
             .sweep = trampolineSweep,
-            .sweepText = "step x cells x two regular meshes with backward Euler and patch bending, and btSoftBody on "
-                         "as many cells; the other models, integrators, tolerances and the irregular mesh at 20 cells "
-                         "and 1/60 s",
+            .sweepText =
+                "step x cells x two regular meshes with backward Euler and patch bending, and btSoftBody on "
+                "as many cells; the other models, integrators, tolerances and the irregular mesh at 20 cells "
+                "and 1/60 s",
             .run = runTrampoline};
 }
 
@@ -187,8 +188,8 @@ std::string computeReferences(const std::function<bool(int done, int all)>& prog
     const std::string strip = computeStripReference();
     if (!progress(1, 2)) return {};
     MotionResult ignored;
-    const double height =
-        trampolineHeight({.dt = 1.0 / 240, .tolerance = 1e-4, .mesh = MeshKind::Alternating, .cells = 60}, kSeconds, ignored);
+    const double height = trampolineHeight(
+        {.dt = 1.0 / 240, .tolerance = 1e-4, .mesh = MeshKind::Alternating, .cells = 60}, kSeconds, ignored);
     char line[80];
     std::snprintf(line, sizeof line, "inline constexpr double kTrampolineHeight = %.6f;\n", height);
     progress(2, 2);
@@ -260,7 +261,8 @@ MomentumDrift momentumDrift(Integrator integrator, bool withBall, double dt) {
         stage.world.stepSimulation(btScalar(dt), 0);
         const Motions now = motionsOf(shell, stage.ball.get());
         drift.linear = std::max(drift.linear, (now.linear - start.linear).norm() / (start.scale * kSimulated));
-        drift.angular = std::max(drift.angular, (now.angular - start.angular).norm() / (start.angular.norm() * kSimulated));
+        drift.angular =
+            std::max(drift.angular, (now.angular - start.angular).norm() / (start.angular.norm() * kSimulated));
         drift.energy = (now.energy - start.energy) / (start.energy * kSimulated);
     }
     return drift;

@@ -7,10 +7,10 @@
 namespace jacket::demo::accuracy {
 namespace {
 
-constexpr double kSide = 1.0;                      // [m]
-constexpr double kStiffness = 1.0;                 // D [N m]
-constexpr double kThickness = 0.02;                // [m]; thin plate theory has no other effect of it
-constexpr double kDeflection = 1e-3 * kThickness;  // about: large against rounding, and all but linear [m]
+constexpr double kSide = 1.0;                       // [m]
+constexpr double kStiffness = 1.0;                  // D [N m]
+constexpr double kThickness = 0.02;                 // [m]; thin plate theory has no other effect of it
+constexpr double kDeflection = 1e-3 * kThickness;   // about: large against rounding, and all but linear [m]
 const StaticSettings kSettings{.tolerance = 1e-6};  // what rounding leaves of such small loads
 
 enum class Edge { Supported, Clamped };
@@ -36,8 +36,8 @@ void hold(Shell& shell, const Case& how, Edge edge) {
 
 Measurement deflection(const Case& how, Edge edge, Load load) {
     const Stopwatch watch;
-    const TriangleMesh mesh = makeSheet(how, {kSide, kSide}, {how.cells, how.cells},
-                                        edge == Edge::Clamped ? Margins{1, 1, 1, 1} : Margins{});
+    const TriangleMesh mesh =
+        makeSheet(how, {kSide, kSide}, {how.cells, how.cells}, edge == Edge::Clamped ? Margins{1, 1, 1, 1} : Margins{});
     Shell shell(mesh, plateMaterial(kStiffness, kThickness, how.poisson), {.bending = how.bending});
     hold(shell, how, edge);
     const PlateDeflection& exact = edge == Edge::Supported ? kSupportedPlate : kClampedPlate;

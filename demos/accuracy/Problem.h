@@ -27,14 +27,14 @@ struct Measurement {
 };
 
 struct Problem {
-    std::string name;      ///< e.g. "heavy cantilever, Gamma 3"
-    std::string quantity;  ///< what is measured and what `error` is relative to
-    std::string source;    ///< of the reference
-    std::vector<int> cells;         ///< two resolutions, the finer last
-    std::vector<double> targets;    ///< largest |error| wanted at each of them
-    std::vector<double> poissons;   ///< ratios it has references for
+    std::string name;              ///< e.g. "heavy cantilever, Gamma 3"
+    std::string quantity;          ///< what is measured and what `error` is relative to
+    std::string source;            ///< of the reference
+    std::vector<int> cells;        ///< two resolutions, the finer last
+    std::vector<double> targets;   ///< largest |error| wanted at each of them
+    std::vector<double> poissons;  ///< ratios it has references for
     std::vector<MeshKind> meshes;
-    bool flatRest = true;           ///< false: QuadraticBending cannot be asked
+    bool flatRest = true;  ///< false: QuadraticBending cannot be asked
     std::function<Measurement(const Case&)> solve;
 };
 

@@ -5,11 +5,13 @@
 
 namespace jacket::demo::accuracy {
 
-bool holdsTangents(const BendingModel& model) { return std::holds_alternative<PatchBending>(model); }
+bool holdsTangents(const BendingModel& model) {
+    return std::holds_alternative<PatchBending>(model);
+}
 
 TriangleMesh makeSheet(const Case& how, const Vec2& size, const Eigen::Vector2i& cells, const Margins& clamped) {
-    TriangleMesh mesh = sheet(how.mesh, size.x(), size.y(), cells.x(), cells.y(),
-                              holdsTangents(how.bending) ? Margins{} : clamped);
+    TriangleMesh mesh =
+        sheet(how.mesh, size.x(), size.y(), cells.x(), cells.y(), holdsTangents(how.bending) ? Margins{} : clamped);
     mesh.positions.colwise() += 0.5 * Vec3(size.x(), size.y(), 0.0);
     return mesh;
 }
@@ -55,7 +57,8 @@ void spreadForce(Shell& shell, const std::vector<int>& edge, int axis, const Vec
     std::sort(sorted.begin(), sorted.end(), [&](int a, int b) { return x(axis, a) < x(axis, b); });
     const double length = x(axis, sorted.back()) - x(axis, sorted.front());
     for (std::size_t i = 0; i < sorted.size(); ++i) {
-        const double from = x(axis, sorted[i == 0 ? 0 : i - 1]), to = x(axis, sorted[std::min(i + 1, sorted.size() - 1)]);
+        const double from = x(axis, sorted[i == 0 ? 0 : i - 1]),
+                     to = x(axis, sorted[std::min(i + 1, sorted.size() - 1)]);
         shell.setForce(sorted[i], 0.5 * (to - from) / length * force);
     }
 }

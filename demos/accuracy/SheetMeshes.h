@@ -52,13 +52,13 @@ inline TriangleMesh sheet(MeshKind kind, double length, double width, int along,
                           const Margins& margins = {}) {
     const int columns = along + margins.left + margins.right, rows = across + margins.bottom + margins.top;
     const double dx = length / along, dy = width / across;
-    TriangleMesh mesh = makeGrid({.size = {columns * dx, rows * dy},
-                                  .cells = {columns, rows},
-                                  .diagonals = kind == MeshKind::OneDiagonal ? GridDiagonals::Right
-                                                                             : GridDiagonals::Alternating,
-                                  .plane = GridPlane::XY});
-    mesh.positions.colwise() += Vec3(0.5 * dx * (margins.right - margins.left),
-                                     0.5 * dy * (margins.top - margins.bottom), 0.0);
+    TriangleMesh mesh =
+        makeGrid({.size = {columns * dx, rows * dy},
+                  .cells = {columns, rows},
+                  .diagonals = kind == MeshKind::OneDiagonal ? GridDiagonals::Right : GridDiagonals::Alternating,
+                  .plane = GridPlane::XY});
+    mesh.positions.colwise() +=
+        Vec3(0.5 * dx * (margins.right - margins.left), 0.5 * dy * (margins.top - margins.bottom), 0.0);
     if (kind != MeshKind::Delaunay) return mesh;
     std::mt19937 generator(1);
     std::uniform_real_distribution<double> shift(-0.3, 0.3);

@@ -132,7 +132,7 @@ Measurement ring(const Case& how) {
                     -radius * (1.0 - std::cos(angle)));
     });
     shell.setPositions(rolled.positions);
-    const auto start = verticesWhere(mesh.positions, [](const Vec3& p) { return p.x() < 1e-9; }), end = tipOf(shell);
+    const auto start = verticesWhere(mesh.positions, [](const Vec3&p) { return p.x() < 1e-9; }), end = tipOf(shell);
     clampEdge(shell, how.bending, start, Vec3::UnitX());
     clampEdge(shell, how.bending, end, Vec3::UnitX());  // which leaves this end towards +x as well
     const StaticReport report = settle(shell, Vec3::Zero());
@@ -156,8 +156,8 @@ Measurement hangingSheet(const Case& how, const HangingCurve& curve) {
     const TriangleMesh mesh = makeStrip(how, kLength, kWidth);
     Shell shell(mesh, plateMaterial(kGravity / kLimp, kVeryThin, how.poisson), {.bending = how.bending});
     shell.setPositions(bent(mesh, [&](double u, double v) { return hangingArc(curve.span, u, v); }).positions);
-    for (const int i : verticesWhere(mesh.positions,
-                                     [](const Vec3& p) { return p.x() < 1e-9 || p.x() > kLength - 1e-9; }))
+    for (const int i :
+         verticesWhere(mesh.positions, [](const Vec3& p) { return p.x() < 1e-9 || p.x() > kLength - 1e-9; }))
         shell.pin(i);
     const StaticReport report = settle(shell, {0, 0, -kGravity});
     return relative(-shell.positions().row(2).minCoeff(), curve.sag, watch, shell, report.converged);

@@ -76,8 +76,13 @@ std::string describe(const MotionRow& row) {
 Plot scatterOf(const Report& report, const MotionProblem& problem) {
     const Trials trials = trialsOf(report, problem, /*withSoftBody=*/true);
     const std::vector<int> front = paretoFront(trials.trials);
-    Plot plot{.title = problem.name + ": error against cost", .xLabel = "CPU time per simulated second",
-              .yLabel = "error", .xUnit = AxisUnit::Seconds, .series = {}, .front = {}, .target = {},
+    Plot plot{.title = problem.name + ": error against cost",
+              .xLabel = "CPU time per simulated second",
+              .yLabel = "error",
+              .xUnit = AxisUnit::Seconds,
+              .series = {},
+              .front = {},
+              .target = {},
               .fadesRest = true};
     std::vector<std::string> names;
     for (std::size_t k = 0; k < trials.trials.size(); ++k) {
@@ -101,8 +106,12 @@ Plot scatterOf(const Report& report, const MotionProblem& problem) {
 
 Plot convergenceOf(const Report& report, const Problem& problem) {
     const Trials trials = trialsOf(report, problem);
-    Plot plot{.title = problem.name, .xLabel = "cells along the main direction", .yLabel = "|error|", .series = {},
-              .front = {}, .target = {}};
+    Plot plot{.title = problem.name,
+              .xLabel = "cells along the main direction",
+              .yLabel = "|error|",
+              .series = {},
+              .front = {},
+              .target = {}};
     if (!problem.targets.empty()) plot.target = problem.targets.back();
     std::map<std::string, Series> byFamily;
     for (std::size_t k = 0; k < trials.trials.size(); ++k) {
@@ -113,10 +122,10 @@ Plot convergenceOf(const Report& report, const Problem& problem) {
         series.name = model + ", " + nameOf(row.how.mesh);
         series.isJoined = true;
         series.dash = dashOf(row.how.mesh);
-        series.markers.push_back({double(row.how.cells), trials.trials[k].error,
-                                  series.name + ", " + std::to_string(row.how.cells) + " cells: " +
-                                      errorText(trials.trials[k].error),
-                                  false});
+        series.markers.push_back(
+            {double(row.how.cells), trials.trials[k].error,
+             series.name + ", " + std::to_string(row.how.cells) + " cells: " + errorText(trials.trials[k].error),
+             false});
     }
     for (auto& [family, series] : byFamily) plot.series.push_back(series);
     return plot;
@@ -137,11 +146,12 @@ std::string noteOf(const Choice& choice) {
 }
 
 HtmlTable cheapestMotion(const Report& report) {
-    HtmlTable table{{"motion", "#accepted", "#CPU per second", "bending", "integrator", "#step", "mesh", "#cells",
-                     "#tolerance", "#error"},
-                    {},
-                    "CPU time of stepping per simulated second. The error is the largest of that case and of every finer one of "
-                    "its kind that was tried, so that errors that happen to cancel are not taken for accuracy."};
+    HtmlTable table{
+        {"motion", "#accepted", "#CPU per second", "bending", "integrator", "#step", "mesh", "#cells", "#tolerance",
+         "#error"},
+        {},
+        "CPU time of stepping per simulated second. The error is the largest of that case and of every finer one of "
+        "its kind that was tried, so that errors that happen to cancel are not taken for accuracy."};
     std::string last;
     for (const Choice& choice : report.cheapestMotion) {
         const MotionCase& how = choice.motion.how;
@@ -159,8 +169,9 @@ bool isOfMany(const Choice& choice) {
 HtmlTable cheapestStatics(const Report& report, bool ofMany) {
     HtmlTable table{{"settled shape", "#accepted", "#CPU", "bending", "mesh", "#cells", "#error"}, {}, ""};
     if (ofMany)
-        table.caption = "The largest error over all problems; CPU time is the mean of their solves. Each problem has a "
-                        "coarser and a finer resolution of its own.";
+        table.caption =
+            "The largest error over all problems; CPU time is the mean of their solves. Each problem has a "
+            "coarser and a finer resolution of its own.";
     std::string last;
     for (const Choice& choice : report.cheapestStatics) {
         if (isOfMany(choice) != ofMany) continue;
@@ -173,7 +184,8 @@ HtmlTable cheapestStatics(const Report& report, bool ofMany) {
 }
 
 std::string answer(const Report& report) {
-    std::string html = "<p>For an error that you accept: the cheapest of all cases that were tried, and what it costs.</p>\n";
+    std::string html =
+        "<p>For an error that you accept: the cheapest of all cases that were tried, and what it costs.</p>\n";
     html += toHtml(cheapestMotion(report));
     const HtmlTable all = cheapestStatics(report, true), each = cheapestStatics(report, false);
     if (all.rows.empty()) return html + toHtml(each);
@@ -201,8 +213,9 @@ HtmlTable motionTable(const Report& report, const MotionProblem& problem) {
 }
 
 std::string motionPart(const Report& report) {
-    std::string html = "<h2>Motion</h2>\n<p>Hold the pointer over a mark to see what it is. Marks on the Pareto front are "
-                       "whole: nothing tried is both cheaper and more exact.</p>\n<div class=\"plots\">\n";
+    std::string html =
+        "<h2>Motion</h2>\n<p>Hold the pointer over a mark to see what it is. Marks on the Pareto front are "
+        "whole: nothing tried is both cheaper and more exact.</p>\n<div class=\"plots\">\n";
     for (const Picture& picture : motionPictures(report)) html += "<div>" + picture.svg + "</div>\n";
     html += "</div>\n";
     for (const MotionProblem& problem : accuracy::motionProblems())
@@ -213,11 +226,12 @@ std::string motionPart(const Report& report) {
 }
 
 std::string integratorPart(const Report& report) {
-    HtmlTable table{{"integrator", "#steps per period", "#amplitude left", "#in theory", "#period ratio", "#in theory"},
-                    {},
-                    "After one period of the lowest mode of a clamped strip, with tolerance 1e-9. In theory: the root z of "
-                    "the method's characteristic polynomial for x'' = -w&sup2;x; backward Euler keeps 1/(1+(wh)&sup2;) of "
-                    "the energy in a step."};
+    HtmlTable table{
+        {"integrator", "#steps per period", "#amplitude left", "#in theory", "#period ratio", "#in theory"},
+        {},
+        "After one period of the lowest mode of a clamped strip, with tolerance 1e-9. In theory: the root z of "
+        "the method's characteristic polynomial for x'' = -w&sup2;x; backward Euler keeps 1/(1+(wh)&sup2;) of "
+        "the energy in a step."};
     for (const IntegratorRow& row : report.integrators)
         table.rows.push_back({nameOf(row.integrator), std::to_string(row.stepsPerPeriod),
                               fixed("%.4f", row.measured.amplitudeLeft), fixed("%.4f", row.theory.amplitudeLeft),
@@ -226,11 +240,12 @@ std::string integratorPart(const Report& report) {
 }
 
 std::string momentumPart(const Report& report) {
-    HtmlTable table{{"system", "integrator", "#step", "#linear momentum", "#angular momentum", "#energy"},
-                    {},
-                    "A 1 x 1 m sheet that turns about once a second in free space, alone or hit by a spinning ball: largest "
-                    "change per second, relative; of the energy what is gained or lost. Near bodies every integrator takes "
-                    "steps of backward Euler."};
+    HtmlTable table{
+        {"system", "integrator", "#step", "#linear momentum", "#angular momentum", "#energy"},
+        {},
+        "A 1 x 1 m sheet that turns about once a second in free space, alone or hit by a spinning ball: largest "
+        "change per second, relative; of the energy what is gained or lost. Near bodies every integrator takes "
+        "steps of backward Euler."};
     for (const MomentumRow& row : report.momentum)
         table.rows.push_back({row.withBall ? "sheet and ball" : "sheet", nameOf(row.integrator), stepText(row.dt),
                               fixed("%.1e", row.drift.linear), percent(row.drift.angular), percent(row.drift.energy)});
@@ -270,8 +285,9 @@ HtmlTable staticTable(const Report& report, const Problem& problem) {
 }
 
 std::string staticPart(const Report& report) {
-    std::string html = "<h2>Settled shapes</h2>\n<p>Signed errors of the models side by side; green where within the "
-                       "target. In the plots: the largest over Poisson's ratios.</p>\n";
+    std::string html =
+        "<h2>Settled shapes</h2>\n<p>Signed errors of the models side by side; green where within the "
+        "target. In the plots: the largest over Poisson's ratios.</p>\n";
     const std::vector<Picture> pictures = staticPictures(report);
     std::size_t k = 0;
     for (const Problem& problem : accuracy::problems()) {
@@ -290,11 +306,14 @@ std::string machineText(const Report& report) {
 }
 
 std::string methodPart() {
-    return "<h2>How it was measured</h2>\n<p>Costs are CPU time of one thread, of the steps or the solve alone: without "
+    return "<h2>How it was measured</h2>\n<p>Costs are CPU time of one thread, of the steps or the solve alone: "
+           "without "
            "building the mesh or writing files. Times under 0.2 s are the median of three runs. "
-           "Settled shapes are found by Newton's method from the flat or rolled rest shape. btSoftBody has the same number "
+           "Settled shapes are found by Newton's method from the flat or rolled rest shape. btSoftBody has the same "
+           "number "
            "of nodes, the same mass and links as stiff as they go, with bending links, 10 iterations and a margin "
-           "of 0.05 m; it knows no Young's modulus, and an error of many times 100 % means that the ball fell through. A "
+           "of 0.05 m; it knows no Young's modulus, and an error of many times 100 % means that the ball fell through. "
+           "A "
            "plastic strip's spring-back is asserted by the tests and not timed here.</p>\n"
            "<p>The same numbers are in report.json and in the CSV tables beside this page, the plots in plots/.</p>\n";
 }
@@ -318,7 +337,9 @@ std::vector<Picture> staticPictures(const Report& report) {
 std::string pageOf(const Report& report) {
     std::string body = "<h1>Jacket: speed against error</h1>\n<p class=\"soft\">" + machineText(report) + "</p>\n";
     if (report.quick)
-        body += "<p><b>A quick look</b>: fewer cases were tried than in a full report, so that dearer ones may be named.</p>\n";
+        body +=
+            "<p><b>A quick look</b>: fewer cases were tried than in a full report, so that dearer ones may be "
+            "named.</p>\n";
     body += answer(report) + motionPart(report) + integratorPart(report) + momentumPart(report) + staticPart(report) +
             methodPart();
     return htmlPage("Jacket: speed against error", body);

@@ -10,8 +10,9 @@ namespace jacket::demo::report {
 namespace {
 
 bool isAtLeastAsFine(const Trial& a, const Trial& b) {
-    return a.family == b.family && std::equal(a.fineness.begin(), a.fineness.end(), b.fineness.begin(), b.fineness.end(),
-                                              [](double x, double y) { return x >= y * (1 - 1e-12); });
+    return a.family == b.family &&
+           std::equal(a.fineness.begin(), a.fineness.end(), b.fineness.begin(), b.fineness.end(),
+                      [](double x, double y) { return x >= y * (1 - 1e-12); });
 }
 
 }  // namespace

@@ -37,11 +37,11 @@ std::vector<StaticRow> plannedStatics(bool quick) {
             for (const BendingModel& model : modelsFor(problem))
                 for (const accuracy::MeshKind mesh : problem.meshes)
                     for (int level = 0; level < levels; ++level)
-                        rows.push_back({.problem = &problem,
-                                        .how = {.mesh = mesh, .cells = problem.cells[level], .bending = model,
-                                                .poisson = poisson},
-                                        .level = level,
-                                        .got = {}});
+                        rows.push_back(
+                            {.problem = &problem,
+                             .how = {.mesh = mesh, .cells = problem.cells[level], .bending = model, .poisson = poisson},
+                             .level = level,
+                             .got = {}});
         }
     }
     return rows;
@@ -65,8 +65,8 @@ void measure(StaticRow& row) {
     try {
         row.got = row.problem->solve(row.how);
         if (row.got.seconds < kShort)
-            row.got.seconds = median(row.got.seconds, row.problem->solve(row.how).seconds,
-                                     row.problem->solve(row.how).seconds);
+            row.got.seconds =
+                median(row.got.seconds, row.problem->solve(row.how).seconds, row.problem->solve(row.how).seconds);
     } catch (const std::exception&) {  // a model that cannot do this problem has no answer
         row.got.converged = false;
     }
@@ -122,8 +122,13 @@ std::vector<Choice> choose(const std::string& name, std::span<const Trial> trial
         const bool isReached = best >= 0;
         if (!isReached) best = mostExact(trials);
         if (best < 0) continue;
-        choices.push_back({.problem = name, .accepted = accepted, .isReached = isReached, .error = reliableError(trials, best),
-                           .cost = trials[best].cost, .statics = {}, .motion = {}});
+        choices.push_back({.problem = name,
+                           .accepted = accepted,
+                           .isReached = isReached,
+                           .error = reliableError(trials, best),
+                           .cost = trials[best].cost,
+                           .statics = {},
+                           .motion = {}});
         index.push_back(best);
     }
     return choices;
@@ -251,9 +256,14 @@ Machine thisMachine() {
 
 Report makeReport(bool quick, const std::function<bool(int done, int all)>& progress) {
     const auto start = std::chrono::steady_clock::now();
-    Report report{.machine = thisMachine(), .quick = quick, .statics = plannedStatics(quick),
-                  .motion = plannedMotion(quick), .integrators = plannedIntegrators(),
-                  .momentum = plannedMomentum(quick), .cheapestStatics = {}, .cheapestMotion = {}};
+    Report report{.machine = thisMachine(),
+                  .quick = quick,
+                  .statics = plannedStatics(quick),
+                  .motion = plannedMotion(quick),
+                  .integrators = plannedIntegrators(),
+                  .momentum = plannedMomentum(quick),
+                  .cheapestStatics = {},
+                  .cheapestMotion = {}};
     const int all = static_cast<int>(report.statics.size() + report.motion.size() + report.integrators.size() +
                                      report.momentum.size());
     int done = 0;
@@ -271,9 +281,7 @@ Report makeReport(bool quick, const std::function<bool(int done, int all)>& prog
                     row.measured = accuracy::vibrationMeasured(row.integrator, row.stepsPerPeriod);
                 }) &&
         forEach(report.momentum,
-                [](MomentumRow& row) {
-                    row.drift = accuracy::momentumDrift(row.integrator, row.withBall, row.dt);
-                }) &&
+                [](MomentumRow& row) { row.drift = accuracy::momentumDrift(row.integrator, row.withBall, row.dt); }) &&
         forEach(report.motion, [](MotionRow& row) { measure(row); }) &&
         forEach(report.statics, [](StaticRow& row) { measure(row); });
     if (isWhole) chooseAll(report);

@@ -22,7 +22,9 @@ bool isDrawable(double value) {
 }
 
 std::string tickText(double value, AxisUnit unit) {
-    return unit == AxisUnit::Percent ? percent(value) : unit == AxisUnit::Seconds ? duration(value) : format("%g", value);
+    return unit == AxisUnit::Percent   ? percent(value)
+           : unit == AxisUnit::Seconds ? duration(value)
+                                       : format("%g", value);
 }
 
 struct Axes {
@@ -62,7 +64,8 @@ std::string drawGrid(const Plot& plot, const Axes& axes) {
         texts += format("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\">%s</text>", kLeft - 7, axes.top(y) + 4,
                         tickText(y, plot.yUnit).c_str());
     }
-    svg += format("<path d=\"M%.1f %.1fV%.1fH%.1f\" fill=\"none\" stroke-opacity=\".6\"/></g>", kLeft, kTop, bottom, right);
+    svg += format("<path d=\"M%.1f %.1fV%.1fH%.1f\" fill=\"none\" stroke-opacity=\".6\"/></g>", kLeft, kTop, bottom,
+                  right);
     const double middle = 0.5 * (kTop + bottom);
     texts += "<text x=\"" + format("%.1f", 0.5 * (kLeft + right)) + "\" y=\"" + format("%.1f", kHeight - 12) +
              "\" text-anchor=\"middle\">" + escaped(plot.xLabel) + "</text>";
@@ -126,8 +129,7 @@ std::string drawLegend(const Plot& plot) {
     }
     if (!plot.front.empty())
         entry("<path stroke=\"currentColor\" stroke-width=\"1.4\" fill=\"none\" d=\"M-9-5H0V5H9\"/>", "Pareto front");
-    if (plot.target)
-        entry("<path stroke=\"currentColor\" stroke-dasharray=\"2 3\" d=\"M-12 0H12\"/>", "target");
+    if (plot.target) entry("<path stroke=\"currentColor\" stroke-dasharray=\"2 3\" d=\"M-12 0H12\"/>", "target");
     return svg + "</g>";
 }
 

@@ -31,7 +31,7 @@ void addHow(Json& json, const accuracy::MotionCase& how) {
 }
 
 Json toJson(const Machine& machine) {
-    return {{"cpu", machine.cpu},     {"cores", machine.cores},         {"threads_used", 1},
+    return {{"cpu", machine.cpu},           {"cores", machine.cores}, {"threads_used", 1},
             {"compiler", machine.compiler}, {"flags", machine.flags}, {"precision", machine.precision},
             {"bullet", machine.bullet}};
 }
@@ -154,8 +154,8 @@ std::string howText(const Choice& choice) {
     }
     const auto& how = choice.statics.how;
     const bool isOfMany = choice.problem == kEveryProblem || choice.problem == kEveryFlatProblem;
-    const std::string cells = isOfMany ? choice.statics.level == 0 ? "coarser cells" : "finer cells"
-                                       : std::to_string(how.cells) + " cells";
+    const std::string cells =
+        isOfMany ? choice.statics.level == 0 ? "coarser cells" : "finer cells" : std::to_string(how.cells) + " cells";
     return nameOf(how.bending) + ", " + nameOf(how.mesh) + ", " + cells;
 }
 
@@ -180,7 +180,9 @@ std::string stepText(double dt) {
 }
 
 Json toJson(const Report& report) {
-    Json json{{"version", JACKET_VERSION}, {"machine", toJson(report.machine)}, {"quick", report.quick},
+    Json json{{"version", JACKET_VERSION},
+              {"machine", toJson(report.machine)},
+              {"quick", report.quick},
               {"wall_s", report.seconds}};
     json["statics"] = listOf(report.statics);
     json["motion"] = listOf(report.motion);
@@ -216,8 +218,9 @@ void printCheapest(std::ostream& out, const Report& report) {
     printChoices(out, report.cheapestMotion, "/s");
     out << "Cheapest way to a settled shape within an error (CPU time of the solve):\n";
     printChoices(out, report.cheapestStatics, "");
-    out << "On " << report.machine.cpu << ", one thread, " << report.machine.compiler << ", " << report.machine.precision
-        << " precision" << (report.quick ? "; a quick look: fewer cases, so that dearer ones may be named.\n" : ".\n");
+    out << "On " << report.machine.cpu << ", one thread, " << report.machine.compiler << ", "
+        << report.machine.precision << " precision"
+        << (report.quick ? "; a quick look: fewer cases, so that dearer ones may be named.\n" : ".\n");
 }
 
 }  // namespace jacket::demo::report

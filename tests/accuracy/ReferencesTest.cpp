@@ -61,8 +61,7 @@ TEST(References, PlatesAgreeWithTheTables) {
         }
     }
     const auto hanging = jsonOf("hanging_sheet.json")["hanging_sheet_omega_sqrt_L_over_g"];
-    for (std::size_t i = 0; i < kHangingFrequencies.size(); ++i)
-        EXPECT_DOUBLE_EQ(hanging[i], kHangingFrequencies[i]);
+    for (std::size_t i = 0; i < kHangingFrequencies.size(); ++i) EXPECT_DOUBLE_EQ(hanging[i], kHangingFrequencies[i]);
     const auto buckling = table["lateral_buckling_selfweight_Gamma_c"];
     EXPECT_DOUBLE_EQ(buckling["nu0_b/L=0.25"]["Gamma_c"], kLateralBuckling[0].gamma);
     EXPECT_DOUBLE_EQ(buckling["nu0.3_b/L=0.25"]["Gamma_c"], kLateralBuckling[1].gamma);

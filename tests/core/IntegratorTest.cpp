@@ -157,7 +157,8 @@ TEST(Integrators, AFreeSpinningShellKeepsItsMomentum) {
         const Vec3 spin(1.0, 2.0, -1.5);
         Points v(3, shell.vertexCount());
         const Vec3 centre = mesh.positions * shell.masses() / shell.masses().sum();
-        for (int i = 0; i < v.cols(); ++i) v.col(i) = spin.cross(Vec3(mesh.positions.col(i)) - centre) + Vec3(0.3, 0, 0);
+        for (int i = 0; i < v.cols(); ++i)
+            v.col(i) = spin.cross(Vec3(mesh.positions.col(i)) - centre) + Vec3(0.3, 0, 0);
         shell.setVelocities(v);
         const Vec3 linear = shell.linearMomentum(), angular = shell.angularMomentum(centre);
         double drift[2];

@@ -90,9 +90,9 @@ struct Filtered {
 };
 template <class... Kept, class Model, class... Models>
 struct Filtered<testing::Types<Kept...>, Model, Models...> {
-    using Types = typename Filtered<std::conditional_t<StencilModel<Model>, testing::Types<Kept..., Model>,
-                                                       testing::Types<Kept...>>,
-                                    Models...>::Types;
+    using Types = typename Filtered<
+        std::conditional_t<StencilModel<Model>, testing::Types<Kept..., Model>, testing::Types<Kept...>>,
+        Models...>::Types;
 };
 template <class, class>
 struct Joined;

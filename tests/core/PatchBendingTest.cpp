@@ -55,8 +55,7 @@ struct Sheet {
           connectivity(mesh.triangles, static_cast<int>(mesh.positions.cols())),
           energy(connectivity, {.positions = mesh.positions, .mirrors = std::move(mirrors)},
                  std::vector<PatchEnergy::Plate>(
-                     mesh.triangles.cols(),
-                     yields ? PatchEnergy::Plate{kStiffness, kPoisson, 0.05, 0.1} : kPlate)) {
+                     mesh.triangles.cols(), yields ? PatchEnergy::Plate{kStiffness, kPoisson, 0.05, 0.1} : kPlate)) {
         std::vector<std::pair<int, int>> pairs;
         energy.collectPairs(pairs);
         system.matrix.setPattern(connectivity.vertexCount(), std::move(pairs));
@@ -91,7 +90,8 @@ struct Sheet {
 
 TriangleMesh curvedSheet(MeshKind kind) {
     TriangleMesh mesh = sheet(kind, 1.0, 0.8, 6, 5);
-    mesh.positions = lifted(mesh.positions, [](double x, double y) { return 0.3 * x * x - 0.2 * x * y + 0.25 * y * y; });
+    mesh.positions =
+        lifted(mesh.positions, [](double x, double y) { return 0.3 * x * x - 0.2 * x * y + 0.25 * y * y; });
     return mesh;
 }
 
@@ -122,16 +122,18 @@ TEST_P(PatchBendingOn, AffineMapsOfAFlatSheetStoreNothing) {
 
 TEST_P(PatchBendingOn, AQuadraticHeightHasItsCurvatureInEveryTriangle) {
     const Sheet s(sheet(GetParam(), 1.0, 0.8, 10, 8));
-    constexpr double kSmall = 1e-4;  // slopes whose squares are rounding
+    constexpr double kSmall = 1e-4;                                      // slopes whose squares are rounding
     const double a = 1.0 * kSmall, b = -0.7 * kSmall, c = 0.4 * kSmall;  // w_xx, w_yy, w_xy
-    const Points x = lifted(s.mesh.positions, [&](double u, double v) { return 0.5 * a * u * u + 0.5 * b * v * v + c * u * v; });
+    const Points x =
+        lifted(s.mesh.positions, [&](double u, double v) { return 0.5 * a * u * u + 0.5 * b * v * v + c * u * v; });
     for (int t = 0; t < s.connectivity.triangleCount(); ++t) {
         const Vec3 k = s.energy.bendingStrain(t, x);
         // invariants, as every triangle has a frame of its own
         EXPECT_NEAR(k[0] + k[1], a + b, 1e-6 * kSmall);
         EXPECT_NEAR(k[0] * k[1] - k[2] * k[2], a * b - c * c, 1e-6 * kSmall * kSmall);
     }
-    const double density = 0.5 * kStiffness * ((1 - kPoisson) * (a * a + b * b + 2 * c * c) + kPoisson * (a + b) * (a + b));
+    const double density =
+        0.5 * kStiffness * ((1 - kPoisson) * (a * a + b * b + 2 * c * c) + kPoisson * (a + b) * (a + b));
     EXPECT_NEAR(s.energy.value(x), density * 0.8, 1e-9 * density);
 }
 
@@ -167,8 +169,8 @@ void expectDerivatives(Sheet& s, const Points& x, double tolerance) {
         Points up = x, down = x;
         up.data()[i] += kStep;
         down.data()[i] -= kStep;
-        worstGradient = std::max(
-            worstGradient, std::abs((s.energy.value(up) - s.energy.value(down)) / (2 * kStep) - g.data()[i]));
+        worstGradient =
+            std::max(worstGradient, std::abs((s.energy.value(up) - s.energy.value(down)) / (2 * kStep) - g.data()[i]));
         const Points column = (s.gradient(up) - s.gradient(down)) / (2 * kStep);
         worstHessian = std::max(worstHessian, (column.reshaped() - exact.col(i)).cwiseAbs().maxCoeff());
     }
@@ -217,7 +219,8 @@ TEST_P(PatchBendingOn, AMirroredHalfIsTheWhole) {
     const double k = 1e-3;
     const Points x = lifted(half.positions, [&](double u, double) { return 0.5 * k * (u + 0.25) * (u + 0.25); });
     shell.setPositions(x);
-    EXPECT_NEAR(shell.energy().bending, 0.5 * material.bendingStiffness() * k * k * 0.4, 1e-5 * material.bendingStiffness() * k * k);
+    EXPECT_NEAR(shell.energy().bending, 0.5 * material.bendingStiffness() * k * k * 0.4,
+                1e-5 * material.bendingStiffness() * k * k);
 }
 
 TEST(PatchBending, YieldsAsTheRuleSays) {

@@ -61,8 +61,12 @@ void runCycle(const Cycle& c) {
     EXPECT_LT(at.gradient.cwiseAbs().maxCoeff(), 1e-9);
 }
 
-TEST_P(PlasticHinge, DihedralFollowsTheClosedForm) { runCycle<DihedralBending>(GetParam()); }
-TEST_P(PlasticHinge, CubicFollowsTheClosedForm) { runCycle<CubicShellBending>(GetParam()); }
+TEST_P(PlasticHinge, DihedralFollowsTheClosedForm) {
+    runCycle<DihedralBending>(GetParam());
+}
+TEST_P(PlasticHinge, CubicFollowsTheClosedForm) {
+    runCycle<CubicShellBending>(GetParam());
+}
 
 TEST(PlasticStretching, UniaxialTensionReturnsToTheYieldStress) {
     // Pulled to a strain far beyond yield with free sides: the tension along is sigma_y t + H t a, none across; the

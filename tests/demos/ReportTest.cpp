@@ -14,16 +14,19 @@ namespace {
 using report::Trial;
 
 TEST(ReportTest, ParetoFrontHoldsWhatNothingBeatsByRisingCost) {
-    const std::vector<Trial> trials{{"a", {1}, 0.10, 1.0}, {"a", {2}, 0.20, 2.0},  // dearer and worse than the first
-                                    {"a", {3}, 0.01, 5.0}, {"b", {1}, 0.05, 3.0},
+    const std::vector<Trial> trials{{"a", {1}, 0.10, 1.0},
+                                    {"a", {2}, 0.20, 2.0},  // dearer and worse than the first
+                                    {"a", {3}, 0.01, 5.0},
+                                    {"b", {1}, 0.05, 3.0},
                                     {"b", {2}, std::numeric_limits<double>::infinity(), 0.1}};
     EXPECT_EQ(report::paretoFront(trials), (std::vector{0, 3, 2}));
     EXPECT_TRUE(report::paretoFront({}).empty());
 }
 
 TEST(ReportTest, CheapestIsNotOneWhoseErrorsCancelByChance) {
-    const std::vector<Trial> trials{{"a", {10, 60}, 0.001, 1.0},   // its finer neighbour is worse
-                                    {"a", {20, 60}, 0.020, 2.0}, {"a", {20, 240}, 0.004, 8.0},
+    const std::vector<Trial> trials{{"a", {10, 60}, 0.001, 1.0},  // its finer neighbour is worse
+                                    {"a", {20, 60}, 0.020, 2.0},
+                                    {"a", {20, 240}, 0.004, 8.0},
                                     {"b", {10, 60}, 0.030, 0.5}};
     EXPECT_DOUBLE_EQ(report::reliableError(trials, 0), 0.020);
     EXPECT_EQ(report::cheapestWithin(trials, 0.10), 3);
@@ -69,9 +72,11 @@ TEST(ReportTest, NumbersAreWrittenForPeople) {
 TEST(ReportTest, APlotLeavesOutWhatALogarithmCannotShow) {
     report::Plot plot;
     plot.title = "a < b";
-    plot.series.push_back({.name = "s", .colour = "#123456", .markers = {{1, 0.1, "seen", false},
-                                                                         {2, 0.0, "zero", false},
-                                                                         {3, std::nan(""), "none", false}}, .dash = {}});
+    plot.series.push_back(
+        {.name = "s",
+         .colour = "#123456",
+         .markers = {{1, 0.1, "seen", false}, {2, 0.0, "zero", false}, {3, std::nan(""), "none", false}},
+         .dash = {}});
     const std::string svg = report::drawSvg(plot);
     EXPECT_NE(svg.find("seen"), std::string::npos);
     EXPECT_EQ(svg.find("zero"), std::string::npos);

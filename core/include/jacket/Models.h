@@ -16,7 +16,7 @@ namespace jacket {
 
 /// The registration lines. A model named here can be chosen in ShellOptions and in scene files, and is tested.
 using MembraneModel = std::variant<StVenantKirchhoffMembrane, BaraffWitkinMembrane, SpringMembrane>;
-using BendingModel = 
+using BendingModel =
     std::variant<PatchBending, DihedralBending, DihedralDifferenceBending, QuadraticBending, CubicShellBending>;
 
 }  // namespace jacket

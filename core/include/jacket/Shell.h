@@ -22,8 +22,8 @@ enum class Preconditioner { BlockJacobi, IncompleteCholesky };
 /// How the state moves through time.
 enum class Integrator {
     BackwardEuler,  ///< one linear solve a step (Baraff & Witkin 1998), linearised again only where edges overstretch
-    Newton,         ///< backward Euler solved to the end: Newton's method with a line search on the incremental potential
-    Bdf2,           ///< Newton too, but second order, variable step, little damping; near bodies as Newton
+    Newton,  ///< backward Euler solved to the end: Newton's method with a line search on the incremental potential
+    Bdf2,    ///< Newton too, but second order, variable step, little damping; near bodies as Newton
 };
 
 /// How a shell is modelled and solved; the defaults are what most scenes want.
@@ -52,20 +52,21 @@ struct ShellEnergy {
 
 /// Where a shell yielded in its last step.
 struct Dent {
-    int triangle = -1;              ///< with the most plastic work; -1: nothing yielded
-    Vec3 position = Vec3::Zero();   ///< of its centre [m]
-    double work = 0.0;              ///< of the whole shell in the step [J]
-    int elements = 0;               ///< hinges or patches, and triangles in their plane, that yielded
+    int triangle = -1;             ///< with the most plastic work; -1: nothing yielded
+    Vec3 position = Vec3::Zero();  ///< of its centre [m]
+    double work = 0.0;             ///< of the whole shell in the step [J]
+    int elements = 0;              ///< hinges or patches, and triangles in their plane, that yielded
 };
 
 /// How long steps may be that choose their length themselves: a step is taken back and halved where it strains an edge
 /// or gains energy by more than this, and lengthened again after four that were not.
 struct AdaptiveStep {
-    double mostStrain = 0.02;      ///< change of an edge's length over its rest length, in one step [-]
-    double mostEnergyGain = 0.01;  ///< of kinetic plus elastic energy, in one step, besides what gravity and forces give
-    double shortest = 1e-6;        ///< taken whatever it does [s]
-    double next = 0.0;             ///< length to try next; 0: all at once [s]
-    int quiet = 0;                 ///< steps since the last rejection or change
+    double mostStrain = 0.02;  ///< change of an edge's length over its rest length, in one step [-]
+    double mostEnergyGain =
+        0.01;                ///< of kinetic plus elastic energy, in one step, besides what gravity and forces give
+    double shortest = 1e-6;  ///< taken whatever it does [s]
+    double next = 0.0;       ///< length to try next; 0: all at once [s]
+    int quiet = 0;           ///< steps since the last rejection or change
 };
 
 struct AdaptiveReport {
@@ -114,8 +115,8 @@ class Shell {
     /// Projector on the directions in which a vertex may move.
     Mat3 freedom(int vertex) const;
 
-    /// Pins an edge of the shell together with its tangent plane. Fixing two rows of vertices instead would clamp half a
-    /// cell too late. All vertices given are pinned; those that have free neighbours must lie on one line (or on one
+    /// Pins an edge of the shell together with its tangent plane. Fixing two rows of vertices instead would clamp half
+    /// a cell too late. All vertices given are pinned; those that have free neighbours must lie on one line (or on one
     /// plane that the shell leaves at a right angle). `direction`: along which the shell leaves the clamp [any length];
     /// without it, as it does now. Only patch bending can hold the tangent: with other models this pins and no more.
     void clamp(const std::vector<int>& vertices, std::optional<Vec3> direction = {});
@@ -170,10 +171,10 @@ class Shell {
     std::unique_ptr<HalfEdgeMesh> m_mesh;
     ShellSettings m_settings;
     Points m_rest, m_x, m_v, m_force;
-    Points m_y;  ///< what the next `advance` adds besides m_stride times velocity [m]
-    double m_stride = 1.0;                 ///< part of the step that velocities count for in it (BDF2: gamma)
-    Points m_lastX, m_lastV;               ///< a step ago, for BDF2
-    double m_lastH = 0.0;                  ///< length of that step; 0: there is none [s]
+    Points m_y;               ///< what the next `advance` adds besides m_stride times velocity [m]
+    double m_stride = 1.0;    ///< part of the step that velocities count for in it (BDF2: gamma)
+    Points m_lastX, m_lastV;  ///< a step ago, for BDF2
+    double m_lastH = 0.0;     ///< length of that step; 0: there is none [s]
     Eigen::VectorXd m_mass, m_restArea;
     std::vector<char> m_pinned;
     std::vector<Vec3> m_pinTarget;

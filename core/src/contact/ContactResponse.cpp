@@ -71,8 +71,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     double shortest = 1e300, speed = 0.0;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
-        for (int i = 0; i < shell.vertexCount(); ++i)
-            m_held[m_offsets[k] + i] = shell.isPinned(i) || shell.isGuided(i);
+        for (int i = 0; i < shell.vertexCount(); ++i) m_held[m_offsets[k] + i] = shell.isPinned(i) || shell.isGuided(i);
         m_edge.push_back(meanEdge(shell));
         shortest = std::min(shortest, m_edge.back());
         speed = std::max(speed, shell.velocities().colwise().norm().maxCoeff());

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "jacket/HalfEdgeMesh.h"
 #include "energy/MirroredMesh.h"
+#include "jacket/HalfEdgeMesh.h"
 #include "jacket/Models.h"
 #include "solver/StepSystem.h"
 
@@ -14,10 +14,10 @@ namespace jacket {
 
 /// What yielded in one step.
 struct PlasticFlow {
-    double work = 0.0;   ///< elastic energy that became heat [J]
-    int elements = 0;    ///< hinges or triangles that yielded
-    int triangle = -1;   ///< where the most work was done
-    double most = 0.0;   ///< there [J]
+    double work = 0.0;  ///< elastic energy that became heat [J]
+    int elements = 0;   ///< hinges or triangles that yielded
+    int triangle = -1;  ///< where the most work was done
+    double most = 0.0;  ///< there [J]
 
     void add(double elementWork, int where) {
         work += elementWork;
@@ -29,9 +29,9 @@ struct PlasticFlow {
 /// What a shell is when nothing acts on it.
 struct RestShape {
     const Points& positions;
-    std::vector<MirrorPlane> mirrors{};    ///< along clamped edges and planes of symmetry
-    std::vector<char> rigid{};             ///< triangles whose corners are all clamped: they do not bend; empty: none
-    bool flattened = false;                ///< bending forgets the curvature that the positions have
+    std::vector<MirrorPlane> mirrors{};  ///< along clamped edges and planes of symmetry
+    std::vector<char> rigid{};           ///< triangles whose corners are all clamped: they do not bend; empty: none
+    bool flattened = false;              ///< bending forgets the curvature that the positions have
 };
 
 /// One energy of one shell: a sum over stencils.

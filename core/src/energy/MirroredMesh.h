@@ -9,9 +9,9 @@ namespace jacket {
 /// A plane beyond which a shell goes on as its mirror image: along a clamped edge, or where a symmetric scene is cut.
 /// The rest shape has a plane of its own, so that a shell may be clamped at another angle than it was made.
 struct MirrorPlane {
-    std::vector<int> vertices;          ///< on the plane
-    Vec3 restPoint, restNormal;         ///< unit normal
-    Vec3 point, normal;                 ///< the same in the world, unit normal
+    std::vector<int> vertices;   ///< on the plane
+    Vec3 restPoint, restNormal;  ///< unit normal
+    Vec3 point, normal;          ///< the same in the world, unit normal
 };
 
 /// x -> linear x + offset.
@@ -29,7 +29,8 @@ class MirroredMesh {
         int vertex, image;
     };
     /// `leftOut`: triangles that are nobody's neighbour; empty: none.
-    MirroredMesh(const HalfEdgeMesh& mesh, const std::vector<MirrorPlane>& planes, const std::vector<char>& leftOut = {});
+    MirroredMesh(const HalfEdgeMesh& mesh, const std::vector<MirrorPlane>& planes,
+                 const std::vector<char>& leftOut = {});
 
     int nodeCount() const { return static_cast<int>(m_nodes.size()); }
     const Node& node(int i) const { return m_nodes[i]; }  ///< the first nodes are the shell's vertices

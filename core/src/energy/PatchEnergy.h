@@ -9,8 +9,8 @@ class PatchEnergy final : public Energy {
   public:
     /// What one triangle is made of.
     struct Plate {
-        double stiffness, poisson;            ///< D [N m], nu
-        double yieldCurvature, hardening;     ///< [1/m], infinite: elastic; ratio H / E [-]
+        double stiffness, poisson;         ///< D [N m], nu
+        double yieldCurvature, hardening;  ///< [1/m], infinite: elastic; ratio H / E [-]
     };
     /// `plates`: one for each triangle. Triangles that can yield get a wider matrix, as curved ones have.
     PatchEnergy(const HalfEdgeMesh& mesh, const RestShape& rest, std::vector<Plate> plates);
@@ -29,12 +29,12 @@ class PatchEnergy final : public Energy {
 
   private:
     struct Element {
-        std::vector<int> vertices;           ///< the triangle's own come first
-        SecondDerivatives rows;              ///< B per vertex; unused where `mirrored` is set
-        Vec3 curvature = Vec3::Zero();       ///< b: uu, vv, uv [1/m]
-        double area = 0.0;                   ///< at rest [m^2]
-        int mirrored = -1;                   ///< index in m_mirrored, or -1
-        double accumulated = 0.0;            ///< plastic curvature so far [1/m]
+        std::vector<int> vertices;      ///< the triangle's own come first
+        SecondDerivatives rows;         ///< B per vertex; unused where `mirrored` is set
+        Vec3 curvature = Vec3::Zero();  ///< b: uu, vv, uv [1/m]
+        double area = 0.0;              ///< at rest [m^2]
+        int mirrored = -1;              ///< index in m_mirrored, or -1
+        double accumulated = 0.0;       ///< plastic curvature so far [1/m]
     };
     /// A patch that sees vertices in a mirror: their images' second derivatives are no longer scalars.
     struct Mirrored {

@@ -109,8 +109,8 @@ std::vector<Patch> fittedPatches(const MirroredMesh& mesh, int triangleCount, co
     return patches;
 }
 
-/// Takes the second derivatives (uu, vv, uv) of a triangle's frame to those of a vertex's, or to those that the vertex's
-/// image has in its own mirror.
+/// Takes the second derivatives (uu, vv, uv) of a triangle's frame to those of a vertex's, or to those that the
+/// vertex's image has in its own mirror.
 Mat3 changeOfFrame(const Mat2& g) {
     Mat3 m;
     m << g(0, 0) * g(0, 0), g(0, 1) * g(0, 1), 2.0 * g(0, 0) * g(0, 1),  //
@@ -165,8 +165,7 @@ class Balance {
                 const Frame seen{mirror * own.u, mirror * own.v,
                                  (mirror * own.normal).dot(patch.normal) < 0.0 ? Vec3(-(mirror * own.normal))
                                                                                : Vec3(mirror * own.normal)};
-                part.frames.push_back(
-                    changeOfFrame(transport({patch.axisU, patch.axisV, patch.normal}, seen)));
+                part.frames.push_back(changeOfFrame(transport({patch.axisU, patch.axisV, patch.normal}, seen)));
             }
             m_parts.push_back(std::move(part));
         }
@@ -188,8 +187,7 @@ class Balance {
         const Part& part = m_parts[t];
         SecondDerivatives wanted(3, part.frames.size());
         for (std::size_t k = 0; k < part.frames.size(); ++k)
-            wanted.col(k) =
-                m_patches[t].area * (part.frames[k].transpose() * multipliers.col(vertexOf(t, k)));
+            wanted.col(k) = m_patches[t].area * (part.frames[k].transpose() * multipliers.col(vertexOf(t, k)));
         wanted = wanted * part.weights.asDiagonal();
         const Eigen::Matrix<double, 3, 6> moments = wanted * part.monomials.transpose();
         return wanted - moments * part.inverse * part.monomials * part.weights.asDiagonal();

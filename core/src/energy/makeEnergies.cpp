@@ -16,7 +16,8 @@ YieldRule yieldRule(const ShellMaterial& m) {
     return {m.yieldCurvature(), *m.yieldStress * m.thickness, m.hardening / m.young, m.hardening * m.thickness};
 }
 
-/// The material of a hinge between two: each triangle's stiffness counts with its area. It yields where the weaker does.
+/// The material of a hinge between two: each triangle's stiffness counts with its area. It yields where the weaker
+/// does.
 ShellMaterial between(const ShellMaterial& a, const ShellMaterial& b, double areaA, double areaB) {
     ShellMaterial m = a.yieldCurvature() <= b.yieldCurvature() ? a : b;
     m.bendingStiffnessOverride = (areaA * a.bendingStiffness() + areaB * b.bendingStiffness()) / (areaA + areaB);
@@ -46,8 +47,11 @@ class Grouping {
         if (isNew) {
             const ShellMaterial material =
                 a == b ? m_materials.list[a] : between(m_materials.list[a], m_materials.list[b], areaA, areaB);
-            m_groups.push_back(
-                {.model = m_model.fittedTo(material), .yield = yieldRule(material), .stencils = {}, .areas = {}, .triangles = {}});
+            m_groups.push_back({.model = m_model.fittedTo(material),
+                                .yield = yieldRule(material),
+                                .stencils = {},
+                                .areas = {},
+                                .triangles = {}});
         }
         Group& group = m_groups[found->second];
         group.stencils.push_back(stencil);

@@ -36,7 +36,8 @@ class StepSystem {
         addMatrix<N>(vertices, slots, term.hessian, m_stiffnessFactor);
     }
 
-    /// The same piece by piece: dE/dx of all vertices; a block of the Hessian on the diagonal, or off it (see pairSlot).
+    /// The same piece by piece: dE/dx of all vertices; a block of the Hessian on the diagonal, or off it (see
+    /// pairSlot).
     void addGradient(const Points& gradient) { rhs -= m_h * gradient; }
     void addDiagonal(int vertex, const Mat3& block) { matrix.diagonal()[vertex] += m_stiffnessFactor * block; }
     void addPair(int slot, const Mat3& block) {
@@ -122,8 +123,7 @@ std::array<int, N*(N - 1) / 2> stencilSlots(const BlockMatrix& matrix, const std
     std::array<int, N*(N - 1) / 2> slots;
     int pair = 0;
     for (int a = 0; a < N; ++a)
-        for (int b = 0; b < a; ++b, ++pair)
-            slots[pair] = pairSlot(matrix, vertices[a], vertices[b]);
+        for (int b = 0; b < a; ++b, ++pair) slots[pair] = pairSlot(matrix, vertices[a], vertices[b]);
     return slots;
 }
 

@@ -79,8 +79,7 @@ void forDirections(const Check& check) {
 
 template <class Model>
 class CylinderTest : public testing::Test {};
-using HingeModels =
-    testing::Types<DihedralBending, DihedralDifferenceBending, QuadraticBending, CubicShellBending>;
+using HingeModels = testing::Types<DihedralBending, DihedralDifferenceBending, QuadraticBending, CubicShellBending>;
 TYPED_TEST_SUITE(CylinderTest, HingeModels);
 
 constexpr double kTolerance = 5e-4;  // of O(0.02^2): cells subtend 0.02 rad

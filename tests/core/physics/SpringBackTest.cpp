@@ -34,7 +34,8 @@ double curvatureLeft(MeshKind kind, int steps, const BendingModel& bending) {
     for (const int i : verticesWhere(mesh.positions, [](const Vec3& p) { return p.x() < -0.5 * kLength + 1e-9; }))
         shell.pin(i);
     // Held at one end and free to turn about it; a third support keeps it from turning as a whole.
-    const std::vector<int> tip = verticesWhere(mesh.positions, [](const Vec3& p) { return p.x() > 0.5 * kLength - 1e-9; });
+    const std::vector<int> tip =
+        verticesWhere(mesh.positions, [](const Vec3& p) { return p.x() > 0.5 * kLength - 1e-9; });
     for (const int i : tip) shell.guide(i, Vec3::UnitZ());
     const StaticReport report = settle(shell, Vec3::Zero());
     EXPECT_TRUE(report.converged);

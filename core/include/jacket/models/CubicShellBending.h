@@ -136,8 +136,8 @@ struct CubicShellBending {
         Stencil<4> folded = r.shape;
         const Vec3 axis = (folded.col(1) - folded.col(0)).normalized();
         // theta grows as x3 turns against its normal's side
-        folded.col(3) = folded.col(0) + Eigen::AngleAxisd(dihedral.angle - r.dihedral.angle, axis) *
-                                            (r.shape.col(3) - r.shape.col(0));
+        folded.col(3) = folded.col(0) +
+                        Eigen::AngleAxisd(dihedral.angle - r.dihedral.angle, axis) * (r.shape.col(3) - r.shape.col(0));
         r = rest(folded, area);
         r.dihedral.angle = dihedral.angle;
         return true;

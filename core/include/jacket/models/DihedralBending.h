@@ -68,8 +68,8 @@ struct DihedralBending {
         return 0.5 * r.weight * bend * bend;
     }
 
-    /// Bending beyond the limit stays: the isotropic rule of O'Brien et al. 2002 with linear hardening, on the curvature
-    /// e = l / (A0 + A1) (theta - theta0), `accumulated` in 1/m.
+    /// Bending beyond the limit stays: the isotropic rule of O'Brien et al. 2002 with linear hardening, on the
+    /// curvature e = l / (A0 + A1) (theta - theta0), `accumulated` in 1/m.
     template <class = void>
     bool flow(const Stencil<4>& x, double area, const YieldRule& rule, Rest& r, double& accumulated) const {
         const double bend = wrapped(angle(x) - r.angle), perAngle = r.length / area;

@@ -158,8 +158,8 @@ struct StVenantKirchhoffMembrane {
     template <class = void>
     bool flow(const Stencil<3>& x, double area, const YieldRule& rule, Rest& r, double& accumulated) const {
         if (weftStiffness) return false;
-        const Eigen::Matrix<double, 3, 2> F = (x.col(1) - x.col(0)) * r.inverseFrame.row(0) +
-                                              (x.col(2) - x.col(0)) * r.inverseFrame.row(1);
+        const Eigen::Matrix<double, 3, 2> F =
+            (x.col(1) - x.col(0)) * r.inverseFrame.row(0) + (x.col(2) - x.col(0)) * r.inverseFrame.row(1);
         const Eigen::SelfAdjointEigenSolver<Mat2> principal(F.transpose() * F);
         const Vec2 squared = principal.eigenvalues();  // of the stretches
         Mat2 law;                                      // thickness times stress from Green strain [N/m]
@@ -182,7 +182,8 @@ struct StVenantKirchhoffMembrane {
         }
         if (!yields) return false;
         const Mat2& axes = principal.eigenvectors();
-        r.inverseFrame = (r.inverseFrame * axes * (-plastic).array().exp().matrix().asDiagonal() * axes.transpose()).eval();
+        r.inverseFrame =
+            (r.inverseFrame * axes * (-plastic).array().exp().matrix().asDiagonal() * axes.transpose()).eval();
         return true;
     }
 

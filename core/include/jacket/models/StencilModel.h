@@ -60,10 +60,10 @@ concept DampedStencilModel = StencilModel<Model> &&
 
 /// Where a sheet stops springing back.
 struct YieldRule {
-    double curvature;    ///< e_y [1/m]
-    double tension;      ///< sigma_y t [N/m]
-    double hardening;    ///< H / E: how much both grow with accumulated plastic strain, relative to the elastic slope [-]
-    double stiffening;   ///< H t [N/m]
+    double curvature;  ///< e_y [1/m]
+    double tension;    ///< sigma_y t [N/m]
+    double hardening;  ///< H / E: how much both grow with accumulated plastic strain, relative to the elastic slope [-]
+    double stiffening;  ///< H t [N/m]
 };
 
 /// What has just been returned to the limit does not yield again.

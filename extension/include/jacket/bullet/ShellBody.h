@@ -25,14 +25,14 @@ struct ShellOptions {
     MembraneModel membrane = StVenantKirchhoffMembrane{};
     BendingModel bending = PatchBending{};
     Integrator integrator = Integrator::BackwardEuler;
-    bool plasticity = false;         ///< keep bends and stretches beyond the material's yield stress
+    bool plasticity = false;             ///< keep bends and stretches beyond the material's yield stress
     std::vector<ShellRegion> regions{};  ///< later ones win where they overlap
-    double tolerance = 1e-3;         ///< of the linear solve, relative
-    int maxIterations = 1000;        ///< of one linear solve
-    double friction = 0.5;           ///< multiplied with the body's, as Bullet does [-]
-    int collisionGroup = 1;          ///< btBroadphaseProxy::DefaultFilter
-    int collisionMask = -1;          ///< btBroadphaseProxy::AllFilter
-    double contactThickness = -1.0;  ///< distance kept from surfaces [m]; < 0: half the shell's thickness
+    double tolerance = 1e-3;             ///< of the linear solve, relative
+    int maxIterations = 1000;            ///< of one linear solve
+    double friction = 0.5;               ///< multiplied with the body's, as Bullet does [-]
+    int collisionGroup = 1;              ///< btBroadphaseProxy::DefaultFilter
+    int collisionMask = -1;              ///< btBroadphaseProxy::AllFilter
+    double contactThickness = -1.0;      ///< distance kept from surfaces [m]; < 0: half the shell's thickness
     Preconditioner preconditioner = Preconditioner::IncompleteCholesky;
 };
 
