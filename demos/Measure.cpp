@@ -153,11 +153,12 @@ double movingMass(const World& world) {
 
 bool isFree(const Scene& scene) {
     const bool shellsFree = std::all_of(scene.shells.begin(), scene.shells.end(), [](const ShellDescription& shell) {
-        return shell.pins.empty() && shell.loads.empty() && shell.pressure == 0 && shell.material.massDamping == 0;
+        return shell.pins.empty() && shell.clamps.empty() && shell.guides.empty() && shell.loads.empty() &&
+               shell.pressure == 0 && shell.material.massDamping == 0;
     });
     const bool bodiesFree =
         std::all_of(scene.bodies.begin(), scene.bodies.end(), [](const auto& body) { return body.mass > 0; });
-    return shellsFree && bodiesFree && !scene.wind;
+    return shellsFree && bodiesFree && !scene.wind && !scene.isStatic;
 }
 
 Json probeValue(const ProbeDescription& probe, const World& world) {

@@ -166,7 +166,10 @@ struct World::Impl {
         for (const Selection& pin : description.pins)
             for (const int vertex : pin.vertices(x)) isPinned[vertex] = 1;
         starts.push_back(x);
-        if (description.perturbation > 0) perturb(x, description.perturbation, isPinned, seed);
+        std::vector<char> isHeld = isPinned;
+        for (const Clamp& clamp : description.clamps)
+            for (const int vertex : clamp.where.vertices(x)) isHeld[vertex] = 1;
+        if (description.perturbation > 0) perturb(x, description.perturbation, isHeld, seed);
         std::vector<btVector3> positions;
         for (int i = 0; i < x.cols(); ++i) positions.push_back(toBullet(Vec3(x.col(i))));
         shell.setPositions(positions);

@@ -242,15 +242,17 @@ void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& 
                     v.col(offsets[k] + i) = 0.5 * (v.col(offsets[k] + i) + rigid.col(offsets[k] + i));
 }
 
-/// What shells and bodies gain in the solved step besides what gravity and forces do, over the energy that they start
+/// What shells and bodies gain in the solved step besides what gravity, forces and moved supports do, over the energy that they start
 /// with.
 double IslandSolver::Impl::energyGain(const IslandInput& input) const {
+    if (input.wind) return 0.0;  // what wind and pressure give is not known
     double atStart = 0.0, gain = 0.0;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         const int n = shell.vertexCount();
         const auto part = v.middleCols(offsets[k], n);
         const auto before = from.middleCols(offsets[k], n);
+        if (shell.pressure() != 0.0) return 0.0;
         for (int i = 0; i < n; ++i) {
             const Vec3 mean = 0.5 * (part.col(i) + before.col(i));
             const double kinetic = 0.5 * shell.masses()[i] * before.col(i).squaredNorm();
@@ -268,6 +270,10 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
         atStart += kinetic;
         gain += 0.5 * u.w.col(b).dot(body.mass * u.w.col(b)) - kinetic;
     }
+    for (const auto& held : system.constraints())  // work of pins and bodies that are moved
+        if (held.body < 0) gain -= std::max(0.0, -unfiltered.col(held.vertex).dot(held.carried));
+    for (const auto& row : system.rows())
+        if (row.body < 0) gain -= std::max(0.0, system.rowImpulse(row, v, u.w).dot(row.carried));
     return gain / std::max(atStart, 1e-300);
 }
 

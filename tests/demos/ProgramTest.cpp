@@ -73,6 +73,31 @@ TEST(Program, RunsTheSceneThatItWroteToTheSameEnd) {
     EXPECT_EQ(TemporaryFolder::read(folder / "a/mesh_0.pc2"), TemporaryFolder::read(folder / "b/mesh_0.pc2"));
 }
 
+TEST(Program, SettlesAStaticScene) {
+    const TemporaryFolder folder;
+    const Outcome run = jacket({"run", "cantilever", "--out", folder / "out", "--quiet"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    const Json result = parseJson(TemporaryFolder::read(folder / "out/result.json"), "result.json");
+    EXPECT_EQ(result["frames"], 1);
+    EXPECT_TRUE(result["momentum_error"].is_null());
+    // heavy elastica at Gamma = 3: 0.93151 L out and 0.33965 L down (tests/data/heavy_elastica.csv)
+    EXPECT_NEAR(result["probes"]["tip"][0].get<double>(), 0.93151 - 0.5, 0.003);
+    EXPECT_NEAR(result["probes"]["tip"][1].get<double>(), -0.33965, 0.003);
+    EXPECT_EQ(jacket({"run", "trampoline", "--set", "mode=static", "--quiet"}).exitCode, 2);
+}
+
+TEST(Program, ReportsADent) {
+    const TemporaryFolder folder;
+    const Outcome run = jacket({"run", "hood", "--seconds", "0.1", "--out", folder / "out", "--quiet"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    const Json result = parseJson(TemporaryFolder::read(folder / "out/result.json"), "result.json");
+    EXPECT_GT(result["energy"]["plastic_work"].get<double>(), 0.1);
+    const Json& dent = result["shells"][0]["dent"];
+    EXPECT_GT(dent["work"].get<double>(), 0.0);
+    EXPECT_NEAR(dent["position"][0].get<double>(), 0.08, 0.15);  // under the ball
+    EXPECT_NEAR(dent["position"][2].get<double>(), 0.05, 0.15);
+}
+
 TEST(Program, BadInputIsExitCode2WithOneMessageAndNothingWritten) {
     const TemporaryFolder folder;
     const std::string scene = folder.write("fall.json", kFallingSheet);

@@ -59,6 +59,10 @@ TEST_F(SceneTest, WrittenOutItGivesItselfAgain) {
         toJson(load(kScene, {"shells.0.membrane.model=baraff-witkin", "shells.0.membrane.shear=12", "wind=[1,2,3]",
                              "shells.0.material={\"preset\":\"paper\",\"yield\":1e7,\"orthotropy\":{\"weft_young\":2e9,"
                              "\"shear\":1e9,\"warp\":[0,0,1]}}",
+                             "shells.0.integrator=bdf2", "shells.0.flatten_rest=true", "load_increments=4",
+                             "shells.0.clamp=[{\"vertices\":[0,1],\"direction\":[0,0,1]},{\"vertices\":[2,3]}]",
+                             "shells.0.guide=[{\"vertices\":[4],\"direction\":[0,1,0]}]",
+                             "shells.0.regions=[{\"box\":[[0,0,0],[1,1,1]],\"material\":\"steel\"}]",
                              "shells.0.force=[{\"vertices\":[3],\"total\":[0,1,0]}]"}));
     EXPECT_EQ(toJson(load(written.dump())), written);
 }
@@ -106,6 +110,12 @@ TEST_F(SceneTest, EveryMistakeIsNamedWithItsPath) {
          "shells.0.material.orthotropy.warp must be a direction"},
         {"shells.0.material.orthotropy={\"weft_young\":1e12,\"shear\":1e5}",
          "shells.0.material.orthotropy must be positive definite"},
+        {"shells.0.integrator=bdf3", "shells.0.integrator has the unknown value \"bdf3\"; did you mean \"bdf2\"?"},
+        {"mode=satic", "mode has the unknown value \"satic\"; did you mean \"static\"?"},
+        {"load_increments=0", "load_increments must be >= 1"},
+        {"shells.0.clamp=[{\"vertices\":[0,1],\"direction\":[0,0,0]}]", "shells.0.clamp.0.direction must not be zero"},
+        {"shells.0.guide=[{\"vertices\":[0]}]", "shells.0.guide.0.direction is missing"},
+        {"shells.0.regions=[{\"vertices\":[0],\"material\":\"steel\"}]", "regions are boxes"},
         {"dt=0", "dt [s] must be > 0, got 0"},
         {"dt=1/0", "dt [s] must be a number > 0 or a fraction"},
         {"gravity=[0,1]", "gravity must be a list of 3 numbers"},
@@ -119,18 +129,14 @@ TEST_F(SceneTest, EveryMistakeIsNamedWithItsPath) {
 
 TEST_F(SceneTest, WhatIsNotThereYetIsRefused) {
     const std::pair<const char*, const char*> cases[] = {
-        {"mode=static", "static equilibrium is not available yet"},
         {"shells.0.self_collision=true", "self-collision is not available yet"},
-        {"shells.0.integrator=bdf2", "\"bdf2\" is not available yet"},
-        {"shells.0.bending=patch", "patch bending is not available yet"},
-        {"shells.0.clamp=[{\"box\":[[0,0,0],[1,1,1]]}]", "clamping an edge with its tangent is not available yet"},
         {"bodies.0.shape={\"mesh\":\"a.obj\"}", "a body that is a triangle mesh is not available yet"},
     };
     for (const auto& [set, expected] : cases) {
         EXPECT_THROW(load(kScene, {set}), NotAvailable) << set;
         EXPECT_NE(complaint(set).find(expected), std::string::npos) << complaint(set);
     }
-    EXPECT_NO_THROW(load(kScene, {"shells.0.self_collision=false", "shells.0.clamp=[]", "mode=dynamic"}));
+    EXPECT_NO_THROW(load(kScene, {"shells.0.self_collision=false", "mode=dynamic"}));
 }
 
 TEST_F(SceneTest, SyntaxErrorsNameFileLineAndColumn) {
