@@ -89,7 +89,26 @@ const StepSystem& ShellAssembly::assembleStatic(const Shell& shell, const Vec3& 
     m_system.begin(1.0, 0.0);  // a step of 1 s without mass: A = K, b = f
     addEnergies(shell.positions(), kind);
     addLoads(shell, gravity, load);
+    if (kind == HessianKind::Exact && shell.pressure() != 0.0) addPressureStiffness(shell, load * shell.pressure());
     return m_system;
+}
+
+/// How pressure follows the surface: force p/6 (x1 - x0) x (x2 - x0) on each corner. Symmetric summed over a closed
+/// surface; of an open one the symmetric part.
+void ShellAssembly::addPressureStiffness(const Shell& shell, double pressure) {
+    for (int t = 0; t < shell.mesh().triangleCount(); ++t) {
+        const auto corners = cornersOf(shell, t);
+        const Stencil<3> x = gather(shell.positions(), corners);
+        const auto byCorner = [&](int j) -> Mat3 {  // -df/dx_j: the edge opposite to it
+            return -pressure / 6.0 * skew(x.col((j + 1) % 3) - x.col((j + 2) % 3));
+        };
+        int pair = 0;
+        for (int a = 0; a < 3; ++a) {
+            m_system.addDiagonal(corners[a], 0.5 * (byCorner(a) + byCorner(a).transpose()));
+            for (int b = 0; b < a; ++b, ++pair)
+                m_system.addPair(m_triangleSlots[t][pair], 0.5 * (byCorner(b) + byCorner(a).transpose()));
+        }
+    }
 }
 
 const StepSystem& ShellAssembly::assemble(const Shell& shell, double h, const Vec3& gravity, const Wind* wind,

@@ -35,6 +35,7 @@ class ShellAssembly {
     PlasticFlow flow(const Points& x);
 
   private:
+    void addPressureStiffness(const Shell& shell, double pressure);
     void splitConstant(const ConstantHessian& hessian);
     void addEnergies(const Points& x, HessianKind kind);
     void addLoads(const Shell& shell, const Vec3& gravity, double load);
