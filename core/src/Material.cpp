@@ -131,15 +131,9 @@ const std::array<Preset, 11>& table() {
          "office paper of 80 g/m^2; modulus, yield and hardening between the two directions of machine-made sheets, "
          "Niskanen (ed.), Paper Physics, 2nd ed. 2008; yield and hardening are estimates"},
         {"cardboard",
-         {.young = 3e9,
-          .poisson = 0.3,
-          .thickness = 5e-4,
-          .density = 700.0,
-          .yieldStress = 9e6,  // 12 MPa along the machine, 6.5 MPa across
-          .hardening = 1e9},
-         "solid board; within the ranges of Ashby, Materials Selection in Mechanical Design, appendix A; yield between "
-         "the two directions in Xia, Boyce and Parks, Int. J. Solids and Structures 39, 2002; hardening "
-         "estimated"},
+         {.young = 3e9, .poisson = 0.3, .thickness = 5e-4, .density = 700.0, .yieldStress = 9e6, .hardening = 1e9},
+         "solid board; within the ranges of Ashby, Materials Selection in Mechanical Design, appendix A; yield and "
+         "hardening estimated, between those along and across the machine's direction"},
         {"rubber",
          {.young = 2e6, .poisson = 0.5, .thickness = 1e-3, .density = 925.0},
          "natural rubber, small strains; within the ranges of Ashby, Materials Selection in Mechanical Design, "
