@@ -242,8 +242,8 @@ void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& 
                     v.col(offsets[k] + i) = 0.5 * (v.col(offsets[k] + i) + rigid.col(offsets[k] + i));
 }
 
-/// What shells and bodies gain in the solved step besides what gravity, forces and moved supports do, over the energy that they start
-/// with.
+/// What shells and bodies gain in the solved step besides what gravity, forces and moved supports do, over the energy
+/// that they start with.
 double IslandSolver::Impl::energyGain(const IslandInput& input) const {
     if (input.wind) return 0.0;  // what wind and pressure give is not known
     double atStart = 0.0, gain = 0.0;
