@@ -19,12 +19,16 @@ double largestStrain(const Shell& shell, const Points& from, const Points& to) {
     return most;
 }
 
-/// Kinetic and elastic energy, less the work that gravity and forces can still do [J].
-double totalEnergy(const Shell& shell, const Points& x, const Points& v, const Vec3& gravity) {
-    double sum = shell.elasticEnergy(x);
+/// Kinetic and elastic [J].
+double ownEnergy(const Shell& shell, const Points& x, const Points& v) {
+    return shell.elasticEnergy(x) + 0.5 * (v.colwise().squaredNorm() * shell.masses()).value();
+}
+
+/// What gravity and forces do on the way from one shape to another [J].
+double workOfLoads(const Shell& shell, const Points& from, const Points& to, const Vec3& gravity) {
+    double sum = 0.0;
     for (int i = 0; i < shell.vertexCount(); ++i)
-        sum += shell.masses()[i] * (0.5 * v.col(i).squaredNorm() - gravity.dot(x.col(i))) -
-               shell.forces().col(i).dot(x.col(i));
+        sum += (shell.masses()[i] * gravity + shell.forces().col(i)).dot(to.col(i) - from.col(i));
     return sum;
 }
 
@@ -44,14 +48,13 @@ AdaptiveReport Shell::stepAdaptively(double duration, const Vec3& gravity, Adapt
         // what is left in equal parts, so that no splinter of a step remains
         const double h = left / std::ceil(left / std::min(control.next, left) - 1e-9);
         const Points v = m_v, lastX = m_lastX, lastV = m_lastV;
-        const double lastH = m_lastH, before = totalEnergy(*this, m_x, m_v, gravity);
+        const double lastH = m_lastH, before = ownEnergy(*this, m_x, m_v);
         IslandInput input{.h = h, .gravity = gravity, .wind = wind, .shells = {&self, 1}};
         const StepReport step = m_ownSolver->solve(input);
         const Points end = m_x + (m_stride * h) * m_v + m_y;
-        const double scale = elasticEnergy(m_x) + 0.5 * (v.colwise().squaredNorm() * m_mass).value();
+        const auto gain = [&] { return ownEnergy(*this, end, m_v) - before - workOfLoads(*this, m_x, end, gravity); };
         const bool acceptable = step.finite && largestStrain(*this, m_x, end) <= control.mostStrain &&
-                                (wind || totalEnergy(*this, end, m_v, gravity) - before <=
-                                             control.mostEnergyGain * std::max(scale, 1e-300));
+                                (wind || gain() <= control.mostEnergyGain * std::max(before, 1e-300));
         if (!acceptable && h > control.shortest) {
             m_v = v;
             m_y.setZero();

@@ -121,8 +121,8 @@ void IslandSolver::Impl::beginTwoStep(const IslandInput& input, std::size_t k) {
 
 /// One linear solve, as Baraff & Witkin have it. Only where it has stretched an edge far beyond what it was, which the
 /// linearisation at the start did not see coming (an unstressed sheet resists no motion out of its plane), it is
-/// linearised again at the end that it found. The other integrators go on until the
-/// velocities no longer change: one linearisation would cost BDF2 its second order wherever a shell turns far.
+/// linearised again at the end that it found. The other integrators go on until the velocities no longer change: one
+/// linearisation would cost BDF2 its second order wherever a shell turns far.
 void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report) {
     constexpr int kMostNewtonSteps = 5, kMostToTheEnd = 30;
     const bool toTheEnd = std::any_of(input.shells.begin(), input.shells.end(), [](const Shell* shell) {
@@ -133,14 +133,14 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
     double leastGain = std::numeric_limits<double>::infinity();
     assemble(input, false);
     for (int newton = 1;; ++newton) {
-        const Points before = v;
+        const Points before = newton == 1 ? Points() : v;  // most steps are over after the first
         solveRounds(input, report);
         if (!unfiltered.allFinite()) return;
         const bool goOn = toTheEnd ? newton == 1 || improves(input, before) : overstretches(input);
         if (!goOn) return;
         if (const double gain = energyGain(input); gain < leastGain) {
             leastGain = gain;
-            calmest = newton == 1 ? Points() : before;
+            calmest = before;
         }
         if (newton == most) break;
         assemble(input, true);
@@ -203,9 +203,10 @@ bool IslandSolver::Impl::overstretches(const IslandInput& input) const {
         for (const auto& e : shell.mesh().edges()) {
             const Vec3 now = x.col(e.v1) - x.col(e.v0);
             const Vec3 then = now + stepOf[k] * (v.col(offsets[k] + e.v1) - v.col(offsets[k] + e.v0));
-            const double length = (rest.col(e.v1) - rest.col(e.v0)).norm();
-            if (then.norm() > std::max(now.norm(), length) + kMost * length) return true;
-            suspect = suspect || std::abs(then.norm() - now.norm()) > kSuspect * length;
+            const double length = (rest.col(e.v1) - rest.col(e.v0)).norm(), lengthNow = now.norm(),
+                         lengthThen = then.norm();
+            if (lengthThen > std::max(lengthNow, length) + kMost * length) return true;
+            suspect = suspect || std::abs(lengthThen - lengthNow) > kSuspect * length;
         }
     }
     return suspect && energyGain(input) > kEnergyGain;

@@ -194,46 +194,36 @@ void PatchEnergy::addTo(StepSystem& system, const Points& x, HessianKind kind) c
     const Points centred = x.colwise() - x.col(0);
     gradient.transpose() = m_constant * centred.transpose();
     for (std::size_t t = 0; t < m_elements.size(); ++t) {
-        const Element& e = m_elements[t];
         const int triangle = static_cast<int>(t);
-        if (e.mirrored >= 0) {
-            addElementGradient(triangle, x, gradient);
-            const auto& hessian = m_mirrored[e.mirrored].hessian;
-            const int* slot = m_slots[t].data();
-            for (std::size_t j = 0; j < e.vertices.size(); ++j) {
-                system.addDiagonal(e.vertices[j], hessian.block<3, 3>(3 * j, 3 * j));
-                for (std::size_t i = j + 1; i < e.vertices.size(); ++i)
-                    system.addPair(*slot++, hessian.block<3, 3>(3 * i, 3 * j));
-            }
-        } else if (!e.curvature.isZero(0.0)) {
-            const Normal normal = normalOf(e.vertices, x);
-            const Eigen::VectorXd weights = normalWeights(triangle, plateMatrix(triangle));
-            Vec3 p = Vec3::Zero();
-            for (std::size_t i = 1; i < e.vertices.size(); ++i)
-                p += weights[i] * (x.col(e.vertices[i]) - x.col(e.vertices[0]));
-            for (std::size_t i = 0; i < e.vertices.size(); ++i) gradient.col(e.vertices[i]) -= weights[i] * normal.n;
-            for (int j = 0; j < 3; ++j) gradient.col(e.vertices[j]) += normal.slopes.col(j).dot(p) * normal.n;
-        }
-        if (!e.curvature.isZero(0.0)) addNormalTerms(triangle, system, x, kind);
+        if (m_elements[t].mirrored >= 0) addMirrored(triangle, system, x, gradient);
+        if (!m_elements[t].curvature.isZero(0.0)) addNormalTerms(triangle, system, x, kind, gradient);
     }
     system.addGradient(gradient);
 }
 
-/// Per vertex D A B^T C b: the energy's term in n is -sum_i weight_i x_i . n.
-Eigen::VectorXd PatchEnergy::normalWeights(int triangle, const Mat3& plate) const {
+/// A mirrored patch's whole gradient, and its constant Hessian, which is no scalar.
+void PatchEnergy::addMirrored(int triangle, StepSystem& system, const Points& x, Points& gradient) const {
     const Element& e = m_elements[triangle];
-    return e.rows.transpose() * (plate * e.curvature);
+    addElementGradient(triangle, x, gradient);
+    const auto& hessian = m_mirrored[e.mirrored].hessian;
+    const int* slot = m_slots[triangle].data();
+    for (std::size_t j = 0; j < e.vertices.size(); ++j) {
+        system.addDiagonal(e.vertices[j], hessian.block<3, 3>(3 * j, 3 * j));
+        for (std::size_t i = j + 1; i < e.vertices.size(); ++i)
+            system.addPair(*slot++, hessian.block<3, 3>(3 * i, 3 * j));
+    }
 }
 
-/// Second derivatives of -p(x) . n(x), p = sum_i w_i x_i. With s_j the slopes:
+/// The energy's term -p(x) . n(x), p = sum_i w_i x_i, w = D A B^T C b: its gradient (a mirrored patch has that
+/// already), and its second derivatives. With s_j the slopes:
 ///   x_i x_j:  w_i s_j n^T;   x_j x_k:  -(s_j . p) s_k n^T - (s_k . p) n s_j^T + (n . p) (s_j . s_k) n n^T
 /// Gauss-Newton keeps of the latter the last term, with its value at rest, b C b, for n . p.
-void PatchEnergy::addNormalTerms(int triangle, StepSystem& system, const Points& x, HessianKind kind) const {
+void PatchEnergy::addNormalTerms(int triangle, StepSystem& system, const Points& x, HessianKind kind,
+                                 Points& gradient) const {
     const Element& e = m_elements[triangle];
     const Normal normal = normalOf(e.vertices, x);
-    const Mat3 plate = plateMatrix(triangle);
     const Vec3& n = normal.n;
-    const Vec3 weighted = plate * e.curvature;
+    const Vec3 weighted = plateMatrix(triangle) * e.curvature;
     const bool mirrored = e.mirrored >= 0;
     const Vec3 p = derivatives(e, x) * weighted;
     const double stiff = kind == HessianKind::Exact ? n.dot(p) : e.curvature.dot(weighted);
@@ -251,20 +241,20 @@ void PatchEnergy::addNormalTerms(int triangle, StepSystem& system, const Points&
             w += weighted[ab] * m_mirrored[e.mirrored].rows.block<3, 3>(3 * ab, 3 * i).transpose();
         return w * slope * n.transpose();
     };
-    const std::size_t count = e.vertices.size(), columns = mirrored ? count : 3;
+    if (!mirrored) {
+        for (std::size_t i = 0; i < e.vertices.size(); ++i)
+            gradient.col(e.vertices[i]) -= weighted.dot(e.rows.col(i)) * n;
+        for (int j = 0; j < 3; ++j) gradient.col(e.vertices[j]) += normal.slopes.col(j).dot(p) * n;
+    }
     std::size_t slot = 0;
-    for (std::size_t j = 0; j < columns; ++j) {
-        for (std::size_t i = j; i < count; ++i) {
-            if (j >= 3) {
-                slot += i > j;
-                continue;
-            }
-            Mat3 block = ofVertex(i, static_cast<int>(j));
+    for (int j = 0; j < 3; ++j) {  // the pairs of the corners come first
+        for (std::size_t i = j; i < e.vertices.size(); ++i) {
+            Mat3 block = ofVertex(i, j);
             if (i < 3) {
                 block += ofVertex(j, static_cast<int>(i)).transpose();
-                block += ofCorners(static_cast<int>(i), static_cast<int>(j));
+                block += ofCorners(static_cast<int>(i), j);
             }
-            if (i == j)
+            if (static_cast<int>(i) == j)
                 system.addDiagonal(e.vertices[j], block);
             else
                 system.addPair(m_slots[triangle][slot++], block);

@@ -52,8 +52,8 @@ class PatchEnergy final : public Energy {
     Vectors residual(const Element& e, const Points& x, const Vec3& normal) const;
     double valueOf(int triangle, const Points& x) const;
     void addElementGradient(int triangle, const Points& x, Points& gradient) const;
-    void addNormalTerms(int triangle, StepSystem& system, const Points& x, HessianKind kind) const;
-    Eigen::VectorXd normalWeights(int triangle, const Mat3& plate) const;
+    void addMirrored(int triangle, StepSystem& system, const Points& x, Points& gradient) const;
+    void addNormalTerms(int triangle, StepSystem& system, const Points& x, HessianKind kind, Points& gradient) const;
 
     std::vector<Plate> m_plates;
     std::vector<Element> m_elements;
