@@ -70,10 +70,10 @@ std::vector<int> IslandFinder::leaders(const std::vector<Obstacle>& obstacles) c
     return leader;
 }
 
-std::vector<Island> IslandFinder::find(double h, bool prescribed) {
+std::vector<Island> IslandFinder::find(double h, bool hasMoved) {
     std::vector<Obstacle> obstacles;
     for (const Neighbour& n : m_neighbours)
-        obstacles.push_back(m_obstacles.make(*n.object, h, *m_world.getDispatcher(), prescribed));
+        obstacles.push_back(m_obstacles.make(*n.object, h, *m_world.getDispatcher(), hasMoved));
     const std::vector<int> leader = leaders(obstacles);
 
     std::vector<Island> islands;

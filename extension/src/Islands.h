@@ -20,8 +20,8 @@ struct Island {
 class IslandFinder {
   public:
     IslandFinder(btCollisionWorld& world, Obstacles& obstacles, std::span<ShellBody* const> shells);
-    /// `prescribed`: see Obstacles::make.
-    std::vector<Island> find(double h, bool prescribed);
+    /// `hasMoved`: see Obstacles::make.
+    std::vector<Island> find(double h, bool hasMoved);
 
   private:
     /// A collision object, the shells whose bounds overlap its own, and those anchored to it.

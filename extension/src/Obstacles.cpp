@@ -90,7 +90,7 @@ Frame moved(const Frame& start, const Vec6& twist, double time) {
     return frame;
 }
 
-Obstacle Obstacles::make(btCollisionObject& object, double h, btDispatcher& dispatcher, bool allPrescribed) {
+Obstacle Obstacles::make(btCollisionObject& object, double h, btDispatcher& dispatcher, bool hasMoved) {
     Obstacle obstacle{&object, &piecesOf(*object.getCollisionShape()), fromBullet(object.getWorldTransform()), {}};
     CoupledBody& coupled = obstacle.body;
     btVector3 centre;
@@ -98,19 +98,19 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, btDispatcher& disp
     object.getCollisionShape()->getBoundingSphere(centre, radius);
     coupled.radius = std::min(double(radius + centre.length()), 1e6);
     coupled.key = &object;
+    for (const auto& piece : obstacle.shape->pieces)
+        coupled.inner = std::min(coupled.inner, 0.5 * (piece->upper() - piece->lower()).minCoeff());
     const btRigidBody* rigid = btRigidBody::upcast(&object);
     if (!rigid || object.isStaticObject()) {
         coupled.prescribed = true;
-    } else if (object.isKinematicObject() || !rigid->isActive() || rigid->getInvMass() == btScalar(0) ||
-               allPrescribed) {
-        coupled.prescribed = true;
-        coupled.freeTwist = twistOf(*rigid);
-        if (allPrescribed) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
     } else {
+        const bool moves = !object.isKinematicObject() && rigid->isActive() && rigid->getInvMass() != btScalar(0);
+        coupled.prescribed = !moves;
+        coupled.freeTwist = moves && !hasMoved ? freeTwistOf(*rigid, h) : twistOf(*rigid);
+        if (hasMoved) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
         coupled.position = obstacle.start.translation();
-        coupled.mass = massOf(*rigid);
-        coupled.freeTwist = freeTwistOf(*rigid, h);
-        addSupports(dispatcher, *rigid, coupled);
+        if (moves) coupled.mass = massOf(*rigid);
+        if (moves && !hasMoved) addSupports(dispatcher, *rigid, coupled);
     }
     coupled.position = obstacle.start.translation();
     return obstacle;

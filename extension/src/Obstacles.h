@@ -33,9 +33,9 @@ struct Obstacle {
 /// Makes obstacles of Bullet's collision objects; keeps the pieces of every shape it has met.
 class Obstacles {
   public:
-    /// Static, kinematic and sleeping bodies become bodies of prescribed motion. With `allPrescribed` every body does,
-    /// and starts where it stood h ago: the motion that Bullet has already made.
-    Obstacle make(btCollisionObject& object, double h, btDispatcher& dispatcher, bool allPrescribed);
+    /// Static, kinematic and sleeping bodies become bodies of prescribed motion. With `hasMoved` every body starts
+    /// where it stood h ago, with the velocity that it has: the motion that Bullet has already made.
+    Obstacle make(btCollisionObject& object, double h, btDispatcher& dispatcher, bool hasMoved);
     /// Shapes without any piece that shells can touch are reported here once, by Bullet's name of the shape.
     std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }
 

@@ -46,7 +46,7 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
                     *m_shells[shell],
                     *pose.positions[shell],
                     moved(obstacle.start, pose.twists[body], pose.time),
-                    vertexReach,
+                    std::min(vertexReach, obstacle.body.inner),  // beyond that its nearest point says nothing
                     faceReach,
                     m_shells[shell]->options().friction * double(obstacle.object->getFriction()),
                     contacts};

@@ -15,9 +15,11 @@ class ShellContacts final : public ContactDetector {
     ShellContacts(std::vector<const ShellBody*> shells, const std::vector<Obstacle>& obstacles,
                   std::vector<std::pair<int, int>> pairs);
     void find(const ContactPose& pose, double vertexReach, double faceReach, std::vector<Contact>& contacts) override;
+    void sweep(const ContactSweep& motion, std::vector<Contact>& contacts) override;
 
   private:
     struct Query;
+    struct Sweep;
     void add(Query& query, int feature, const SurfacePoint& surface, const std::array<int, 3>& vertices,
              const Vec3& weights);
     void findVertices(Query& query, const ConvexPiece& piece);

@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "Convert.h"
+#include "FastBodies.h"
 #include "Islands.h"
 #include "ShellContacts.h"
 #include "ShellProxy.h"
@@ -62,6 +63,7 @@ struct ShellWorld::Impl {
     Obstacles obstacles;
     std::map<const ShellBody*, IslandSolver> solvers;  ///< of each island, by its first shell
     std::vector<CarriedVertex> carried;
+    FastBodies::Solved solved;
     Wind wind;
     bool hasWind = false;
 };
@@ -116,11 +118,15 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     WorldReport report{.shells = size()};
     report.rejectedSteps = m_report.rejectedSteps;
     report.unconvergedSteps = m_report.unconvergedSteps;
+    report.passedSteps = m_report.passedSteps;
     m_report = report;
-    solveNewcomers(*world, double(h));
-    moveShells(*world, double(h));
     std::vector<ShellBody*> all;
     for (const auto& shell : m_shells) all.push_back(shell.get());
+    solveNewcomers(*world, double(h));
+    FastBodies fast(*world, m_impl->obstacles, all, m_impl->solved, double(h));
+    moveShells(*world, double(h));
+    fast.holdBack();
+    m_impl->solved.clear();
     for (Island& island : IslandFinder(*world, m_impl->obstacles, all).find(double(h), false))
         solveIsland(island, double(h));
     for (const auto& shell : m_shells) updateBounds(*shell, double(h));
@@ -181,6 +187,8 @@ void ShellWorld::accept(Island& island, const StepReport& report, const std::vec
                         const Vec3& pendingGravity) {
     m_report.pcgIterations += report.pcgIterations;
     m_report.solves += report.solves;
+    m_report.passedSteps += report.passed ? 1 : 0;
+    m_report.limited = m_report.limited || report.limited;
     m_report.contacts += static_cast<int>(report.contacts.size());
     m_report.converged = m_report.converged && report.converged;
     m_report.finite = m_report.finite && report.finite;
@@ -200,7 +208,10 @@ void ShellWorld::accept(Island& island, const StepReport& report, const std::vec
     }
     for (const Anchor& anchor : island.anchors)
         carry(*island.shells[anchor.shell], anchor.vertex, island, anchor.body, coupled, &anchor.point);
-    for (std::size_t b = 0; b < coupled.size(); ++b) react(*island.obstacles[b].object, coupled[b]);
+    for (std::size_t b = 0; b < coupled.size(); ++b) {
+        react(*island.obstacles[b].object, coupled[b]);
+        if (!report.passed) m_impl->solved[island.obstacles[b].object] = coupled[b].twist;
+    }
 }
 
 void ShellWorld::carry(const ShellBody& shell, int vertex, const Island& island, int body,

@@ -15,10 +15,11 @@ struct CoupledBody {
         Mat6::Zero();  ///< blockdiag(m I, R I R^T); rigid contacts that hold the body may be added as stiff terms
     Vec6 freeTwist = Vec6::Zero();  ///< w*: what it would do without the shells, the coming gravity included
     double radius = 0.0;            ///< of a ball around `position` that holds the body [m]
-    const void* key = nullptr;      ///< the same from step to step: whose contacts to remember
-    bool prescribed = false;        ///< static, kinematic or sleeping: moves with freeTwist whatever the shells do
-    Vec6 twist = Vec6::Zero();      ///< out: solved twist at the end of the step, to the solve's tolerance
-    Vec6 impulse = Vec6::Zero();    ///< out: what the shells gave it, exactly, about its centre of mass [N s, N m s]
+    double inner = 1e300;  ///< of a ball that fits into its thinnest piece: contacts of faster motion are swept [m]
+    const void* key = nullptr;    ///< the same from step to step: whose contacts to remember
+    bool prescribed = false;      ///< static, kinematic or sleeping: moves with freeTwist whatever the shells do
+    Vec6 twist = Vec6::Zero();    ///< out: solved twist at the end of the step, to the solve's tolerance
+    Vec6 impulse = Vec6::Zero();  ///< out: what the shells gave it, exactly, about its centre of mass [N s, N m s]
 };
 
 /// Where a piece of a shell meets a body: one vertex (weights 1 0 0), or a point of an edge or triangle.
@@ -32,6 +33,7 @@ struct Contact {
     Vec3 point{0, 0, 0};            ///< on the body's surface [m]
     double gap = 0.0;               ///< signed distance minus contact thickness at the queried configuration [m]
     double friction = 0.0;          ///< Coulomb coefficient of the pair [-]
+    double time = 0.0;              ///< of touch, where it was found by sweeping [s]
     bool isVertex() const { return weights.x() == 1.0; }
 };
 
@@ -62,6 +64,14 @@ struct ContactPose {
     double time;                               ///< 0 at the start of the step, h at its end [s]
 };
 
+/// A motion through one step: straight for vertices, with constant twists for bodies.
+struct ContactSweep {
+    std::span<const Points*const> start, end;  ///< positions, one per shell of the island [m]
+    std::span<const Vec6> twists;              ///< one per body
+    std::span<const char> fast;                ///< one per body: whether to look at it
+    double time;                               ///< the step's length [s]
+};
+
 /// The collision code, as the solver sees it.
 class ContactDetector {
   public:
@@ -71,6 +81,10 @@ class ContactDetector {
     /// deepest.
     virtual void find(const ContactPose& pose, double vertexReach, double faceReach,
                       std::vector<Contact>& contacts) = 0;
+    /// Appends the contacts that vertices, edges and triangles make with the fast bodies on their way, for bodies that
+    /// could have passed a shell between two poses. `gap` is how far that motion brings them together along the normal
+    /// until they touch, `normal` and `point` are those of that moment; `time` is when it is.
+    virtual void sweep(const ContactSweep&, std::vector<Contact>&) {}
 };
 
 }  // namespace jacket

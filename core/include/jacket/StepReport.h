@@ -13,6 +13,7 @@ struct StepReport {
     bool converged = true;  ///< false: a solve hit its iteration budget, or the active set its round budget
     bool finite = true;     ///< false: the step was rejected and the state is what it was before
     bool limited = false;   ///< Newton did not settle and the step would have gained energy: deformation was cut short
+    bool passed = false;    ///< a fast body is through a shell at the end of the step
     double deepestGap = 0.0;  ///< most negative predicted gap that was left at the end of the step [m], <= 0
     std::vector<ContactImpulse> contacts;  ///< those that carried an impulse
 };

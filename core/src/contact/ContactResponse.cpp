@@ -13,12 +13,16 @@ constexpr double kRowPenalty = 10.0;  // penalty of a soft row over the stiffnes
 constexpr double kAlteration = 0.2;   // share of a penetration that a step takes back, and share of an edge at most
 constexpr double kMostOffset =
     0.15;  // of an edge: how far vertices are lifted off a curved body for their chords' sake
-constexpr double kOffsetDecay = 0.998;  // a step: a lift that is no longer needed goes away
-constexpr double kPull = 1e-3;          // of the largest impulse: a contact that pulls less may stay for the step
-constexpr int kPatience = 10;           // steps before a contact that slid is tried as a sticking one again
-constexpr int kFrictionRounds = 2;      // then the lagged friction of the last round stands
-constexpr int kFreezeRound = 7;         // from here on normals stay: a triangle that tips to and fro would never settle
-constexpr int kMostChanges = 10;        // a contact that flips more often than this stays as it is
+constexpr double kOffsetDecay = 0.998;    // a step: a lift that is no longer needed goes away
+constexpr double kPull = 1e-3;            // of the largest impulse: a contact that pulls less may stay for the step
+constexpr int kFrictionRounds = 4;        // then the lagged friction of the last round stands
+constexpr int kMostFlips = 3;             // a contact that sticks and slides by turns more often is damped instead
+constexpr double kNearEdge = 0.1;         // weight of a triangle's corner below which its contact is an edge's
+constexpr double kSameContact = 0.3;      // of an edge: how far the point of a face's contact may move in a step
+constexpr double kFrictionChange = 0.02;  // of a contact's friction: less needs no other solve
+constexpr double kMinor = 0.2;            // of the largest friction: what less does is compared with this
+constexpr int kFreezeRound = 7;   // from here on normals stay: a triangle that tips to and fro would never settle
+constexpr int kMostChanges = 10;  // a contact that flips more often than this stays as it is
 
 double meanEdge(const Shell& shell) {
     double sum = 0.0;
@@ -33,8 +37,33 @@ Mat3 tangential(const Vec3& n) {
 
 }  // namespace
 
+/// Near an edge the contacts of both its triangles are one, the edge's: a body that rolls over it keeps its contact.
 ContactResponse::Key ContactResponse::keyOf(const Contact& c) const {
-    return {m_input.shells[c.shell], m_input.bodies[c.body].key, c.feature};
+    const Shell& shell = *m_input.shells[c.shell];
+    const HalfEdgeMesh& mesh = shell.mesh();
+    int feature = c.feature, corner = 0;
+    const int firstTriangle = Feature::triangle(0, mesh.vertexCount(), static_cast<int>(mesh.edges().size()));
+    if (feature >= firstTriangle && c.weights.minCoeff(&corner) < kNearEdge)
+        feature = Feature::edge(mesh.edgeOf(3 * (feature - firstTriangle) + (corner + 1) % 3), mesh.vertexCount());
+    return {&shell, m_input.bodies[c.body].key, feature};
+}
+
+/// What the last step knew of a contact. A point of a face may have moved to a neighbouring one since.
+const ContactResponse::Memory* ContactResponse::remembered(const Contact& c) const {
+    const Key key = keyOf(c);
+    if (const auto known = m_memory.find(key); known != m_memory.end()) return &known->second;
+    if (c.isVertex()) return nullptr;
+    const Memory* nearest = nullptr;
+    double least = kSameContact * m_edge[c.shell];
+    const auto first = m_memory.lower_bound({std::get<0>(key), std::get<1>(key), 0});
+    for (auto other = first; other != m_memory.end(); ++other) {
+        if (std::get<0>(other->first) != std::get<0>(key) || std::get<1>(other->first) != std::get<1>(key)) break;
+        const double distance = (other->second.point - c.point).norm();
+        if (other->second.isVertex || distance >= least) continue;
+        least = distance;
+        nearest = &other->second;
+    }
+    return nearest;
 }
 
 void ContactResponse::place(Touch& touch, const Contact& contact) const {
@@ -90,29 +119,127 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     const std::vector<Vec6> still(input.bodies.size(), Vec6::Zero());
     m_found.clear();
     input.contacts->find({positions, still, 0.0}, reach, m_memory.empty() ? kNone : 10.0 * m_vertexSlop, m_found);
+    const std::map<int, double> room = roomBesideFaces();
+    for (const Contact& contact : m_found) addAtStart(contact, room, y);
+    findFast();
+    if (m_anyFast) sweepAtStart();
+    keepEarliest();
+}
+
+void ContactResponse::addAtStart(const Contact& contact, const std::map<int, double>& room, Points& y) {
+    Touch touch = makeTouch(contact);
+    const Memory* memory = remembered(contact);
+    if (!contact.isVertex() && !memory) return;  // found at the end of the step if it matters
+    if (memory && memory->offset > 0.0) {
+        const auto faces = room.find(globalVertex(contact, 0));
+        const double most = faces == room.end() ? std::numeric_limits<double>::infinity() : faces->second;
+        touch.offset = memory->offset - std::clamp((1.0 - kOffsetDecay) * memory->offset, 0.0, std::max(0.0, most));
+    }
+    touch.contact.gap -= touch.offset;
+    touch.target = -std::max(touch.contact.gap, 0.0) / m_input.h;
+    touch.allowedGap = std::min(touch.contact.gap, 0.0);
+    touch.active = timeOfTouch(touch) <= m_input.h;
+    if (memory) {
+        const double scale = m_input.h / m_memoryStep;
+        touch.lambda = memory->impulse * scale;
+        touch.sticks = memory->sticks;
+        touch.slip = memory->slip;
+        touch.slip.limit *= scale;
+        touch.slip.held = tangential(touch.contact.normal) * touch.slip.held * scale;
+        touch.active = touch.active || touch.contact.gap < 10.0 * m_vertexSlop;
+    }
+    const auto [known, fresh] = m_index.try_emplace(keyOf(contact), static_cast<int>(m_touches.size()));
+    if (!fresh && m_touches[known->second].contact.gap <= touch.contact.gap) return;
+    if (touch.contact.gap < 0.0) alter(touch, y);
+    if (fresh)
+        m_touches.push_back(touch);
+    else
+        m_touches[known->second] = touch;
+}
+
+/// Per vertex the least gap of the faces and edges around it that have been found: as far as it may come down.
+std::map<int, double> ContactResponse::roomBesideFaces() const {
+    std::map<int, double> room;
     for (const Contact& contact : m_found) {
-        Touch touch = makeTouch(contact);
-        const auto remembered = m_memory.find(keyOf(contact));
-        if (!contact.isVertex() && remembered == m_memory.end())
-            continue;  // found at the end of the step if it matters
-        if (remembered != m_memory.end()) touch.offset = kOffsetDecay * remembered->second.offset;
-        touch.contact.gap -= touch.offset;
-        touch.target = -std::max(touch.contact.gap, 0.0) / input.h;
-        touch.allowedGap = std::min(touch.contact.gap, 0.0);
-        if (remembered != m_memory.end()) {
-            touch.lambda = remembered->second.impulse * input.h / m_memoryStep;
-            touch.sticks = remembered->second.sticks;
-            touch.patience = std::max(0, remembered->second.patience - 1);
-            touch.drag = remembered->second.drag;
-            touch.active = touch.contact.gap < 10.0 * m_vertexSlop || timeOfTouch(touch) <= input.h;
-        } else {
-            touch.active = timeOfTouch(touch) <= input.h;
+        if (contact.isVertex()) continue;
+        for (int a = 0; a < 3; ++a) {
+            const auto [known, fresh] = room.try_emplace(globalVertex(contact, a), contact.gap);
+            if (!fresh) known->second = std::min(known->second, contact.gap);
         }
-        if (touch.contact.gap < 0.0) alter(touch, y);
-        m_index[keyOf(contact)] = static_cast<int>(m_touches.size());
+    }
+    return room;
+}
+
+/// Bodies that move farther relative to some vertex than they are thick.
+void ContactResponse::findFast() {
+    m_fast.assign(m_input.bodies.size(), 0);
+    m_anyFast = false;
+    for (std::size_t b = 0; b < m_input.bodies.size(); ++b) {
+        const CoupledBody& body = m_input.bodies[b];
+        const double least =
+            std::pow((body.inner - body.freeTwist.tail<3>().norm() * m_input.h * body.radius) / m_input.h, 2);
+        for (int i = 0; i < m_expected->cols() && !m_fast[b]; ++i)
+            m_fast[b] = (m_expected->col(i) - body.freeTwist.head<3>()).squaredNorm() > least;
+        m_anyFast = m_anyFast || m_fast[b];
+    }
+}
+
+/// Contacts that only the motion of the step shows.
+void ContactResponse::sweepAtStart() {
+    m_end.resize(m_input.shells.size());
+    std::vector<const Points*> start, end;
+    for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
+        const Points& x = m_input.shells[k]->positions();
+        m_end[k] = x + m_input.h * m_expected->middleCols(m_offsets[k], x.cols());
+        start.push_back(&x);
+        end.push_back(&m_end[k]);
+    }
+    std::vector<Vec6> twists;
+    for (const CoupledBody& body : m_input.bodies) twists.push_back(body.freeTwist);
+    m_found.clear();
+    m_input.contacts->sweep({start, end, twists, m_fast, m_input.h}, m_found);
+    for (const Contact& contact : m_found) {
+        const auto [known, fresh] = m_index.try_emplace(keyOf(contact), static_cast<int>(m_touches.size()));
+        if (!fresh) continue;
+        Touch touch = makeTouch(contact);
+        touch.target = -contact.gap / m_input.h;
+        touch.active = true;
         m_touches.push_back(touch);
     }
-    keepEarliest();
+}
+
+/// The same for the solved motion, into m_found.
+void ContactResponse::sweepToEnd() {
+    std::vector<const Points*> start, end;
+    for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
+        start.push_back(&m_input.shells[k]->positions());
+        end.push_back(&m_end[k]);
+    }
+    m_found.clear();
+    m_input.contacts->sweep({start, end, m_endTwists, m_fast, m_input.h}, m_found);
+}
+
+bool ContactResponse::passes(const IslandVelocities& solved, const Points& y) {
+    if (!m_input.contacts || !m_anyFast) return false;
+    moveToEnd(solved, y);
+    sweepToEnd();
+    return !m_found.empty();
+}
+
+/// Holds what the solved motion passes first.
+bool ContactResponse::closeFirst(int round) {
+    sweepToEnd();
+    if (m_found.empty()) return false;
+    const auto first = std::min_element(m_found.begin(), m_found.end(),
+                                        [](const Contact& a, const Contact& b) { return a.time < b.time; });
+    const auto [known, fresh] = m_index.try_emplace(keyOf(*first), static_cast<int>(m_touches.size()));
+    if (fresh) m_touches.push_back(makeTouch(*first));
+    Touch& touch = m_touches[known->second];
+    if (touch.active && round >= kFreezeRound) return false;
+    place(touch, *first);
+    touch.active = true;
+    touch.target = -first->gap / m_input.h;  // as close as they were when they touched
+    return true;
 }
 
 /// The first vertices to meet a free body will slow it down, and the others may never come to touch it: held all
@@ -120,7 +247,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
 /// rounds.
 void ContactResponse::keepEarliest() {
     std::vector<double> earliest(m_input.bodies.size(), 2.0 * m_input.h);
-    const auto isRemembered = [&](const Touch& t) { return m_memory.count(keyOf(t.contact)) > 0; };
+    const auto isRemembered = [&](const Touch& t) { return remembered(t.contact) != nullptr; };
     for (const Touch& touch : m_touches)
         if (touch.active && touch.dynamicBody >= 0)
             earliest[touch.contact.body] =
@@ -132,6 +259,7 @@ void ContactResponse::keepEarliest() {
 
 /// When a contact closes if nothing else happens, from the start of the step; infinite if it does not [s].
 double ContactResponse::timeOfTouch(const Touch& touch) const {
+    if (touch.contact.time > 0.0) return touch.contact.time;
     const CoupledBody& body = m_input.bodies[touch.contact.body];
     Vec3 velocity = -pointVelocity(body.freeTwist, touch.arm);
     for (int a = 0; a < 3; ++a) velocity += touch.contact.weights[a] * m_expected->col(globalVertex(touch.contact, a));
@@ -235,7 +363,26 @@ void ContactResponse::finishFilter(const VertexFilter& filter, VertexConstraint&
         return;
     }
     constraint.free = Mat3::Identity() - held;
-    constraint.damping = first.drag * constraint.free;
+    for (int k = 0; k < filter.count; ++k)
+        addFriction(m_touches[filter.touches[k]], constraint.damping, constraint.load);
+    constraint.damping = (constraint.free * constraint.damping * constraint.free).eval();
+}
+
+/// Coulomb's law about the last solve's sliding velocity s, with t = s / |s| and T the tangent plane:
+///     -limit s / |s|  ~  -limit t - limit / |s| (T - t t^T) s
+/// Along t its size is exact whatever the speed; as a damping it would be too large in every step that speeds up.
+void ContactResponse::addFriction(const Touch& touch, Mat3& damping, Vec3& load) const {
+    const Slip& slip = touch.slip;
+    if (!slip.known) return;
+    const Mat3 plane = tangential(touch.contact.normal);
+    if (touch.sticks) {  // a soft row
+        damping += touch.kappa * plane;
+        load += slip.held;
+        return;
+    }
+    const Vec3 t = slip.direction;
+    damping += slip.limit / std::max(slip.speed, slowest()) * (plane - t * t.transpose());
+    load -= slip.limit * t;
 }
 
 double ContactResponse::vertexStiffness(const CoupledSystem& system, const Touch& touch) const {
@@ -256,9 +403,9 @@ SoftRow ContactResponse::makeRow(Touch& touch, const CoupledSystem& system) cons
     row.body = touch.dynamicBody;
     row.arm = touch.arm;
     row.carried = touch.carried;
-    const double drag = touch.sticks ? touch.kappa : touch.drag;
-    row.stiffness = touch.kappa * c.normal * c.normal.transpose() + drag * tangential(c.normal);
+    row.stiffness = touch.kappa * c.normal * c.normal.transpose();
     row.load = (touch.kappa * touch.target + touch.lambda) * c.normal;
+    addFriction(touch, row.stiffness, row.load);
     return row;
 }
 
@@ -289,8 +436,10 @@ void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelo
         const Vec3 u = relativeVelocity(touch, solved);
         const Vec3& n = touch.contact.normal;
         touch.normalImpulse = touch.lambda + touch.kappa * (touch.target - u.dot(n));
-        const double drag = touch.sticks ? touch.kappa : touch.drag;
-        touch.impulse = touch.normalImpulse * n - drag * (u - u.dot(n) * n);
+        Mat3 damping = Mat3::Zero();
+        touch.impulse = touch.normalImpulse * n;
+        addFriction(touch, damping, touch.impulse);
+        touch.impulse -= damping * u;
     }
     for (const auto& filter : m_filters) {
         const Vec3 total = -solved.unfiltered.col(system.constraints()[filter.constraint].vertex);
@@ -327,53 +476,83 @@ bool ContactResponse::releasePulling(int round) {
 
 bool ContactResponse::updateFriction(const CoupledSystem& system, const IslandVelocities& solved) {
     if (++m_frictionRounds > kFrictionRounds) return false;
-    const double still = 0.02 * m_input.h * std::max(m_input.gravity.norm(), 1e-3);  // slower than this may stick
+    double most = 0.0;
+    for (const Touch& touch : m_touches) most = std::max(most, touch.contact.friction * touch.normalImpulse);
     bool changed = false;
     for (Touch& touch : m_touches) {
         const double limit = touch.contact.friction * touch.normalImpulse;
-        if (!touch.active || touch.contact.friction <= 0.0 || touch.normalImpulse <= 0.0) continue;
-        const Vec3& n = touch.contact.normal;
-        const Vec3 slide = relativeVelocity(touch, solved);
-        const double slip = (slide - slide.dot(n) * n).norm();
-        if (touch.sticks) {
-            const double force = (touch.impulse - touch.normalImpulse * n).norm();
-            if (force <= 1.001 * limit) continue;
-            touch.sticks = false;  // its slip is not known yet: what the excess force would give this vertex alone
-            touch.patience = kPatience;
-            touch.drag = limit / std::max((force - limit) / vertexStiffness(system, touch), still);
-            changed = true;
-        } else if (slip < still && touch.patience == 0 && !touch.isRow) {
-            touch.sticks = true;
-            changed = true;
-        } else {
-            const double drag = limit / std::max(slip, 0.1 * still);
-            if (std::abs(drag - touch.drag) * slip > 0.05 * limit) changed = true;
-            touch.drag = drag;
-        }
+        if (!touch.active || limit <= 0.0) continue;
+        const Vec3 slide = tangential(touch.contact.normal) * relativeVelocity(touch, solved);
+        const double matters = kFrictionChange * std::max(limit, kMinor * most);
+        changed |= touch.sticks ? updateSticking(touch, slide, matters, vertexStiffness(system, touch))
+                                : updateSliding(touch, slide, matters);
     }
     return changed;
 }
 
-bool ContactResponse::checkEnd(const IslandVelocities& solved, const Points& y, int round) {
+/// A contact slides once more holds it than friction can. `matters`: change of impulse that is worth another solve
+/// [N s]; `stiffness`: impulse over velocity of its vertices [kg].
+bool ContactResponse::updateSticking(Touch& touch, const Vec3& slide, double matters, double stiffness) const {
+    const double limit = touch.contact.friction * touch.normalImpulse;
+    const Vec3 held = touch.impulse - touch.normalImpulse * touch.contact.normal;
+    const double force = held.norm();
+    if (force <= limit + 0.05 * matters) {
+        const bool creeps = touch.isRow && touch.kappa * slide.norm() > matters;
+        touch.slip.held = held;
+        return creeps;
+    }
+    touch.sticks = false;
+    ++touch.flips;
+    touch.slip.known = true;
+    touch.slip.limit = limit;
+    touch.slip.direction = -held / force;
+    touch.slip.speed = (force - limit) / stiffness;  // what the excess would give these vertices alone
+    return true;
+}
+
+/// A contact sticks once friction turns its sliding around.
+bool ContactResponse::updateSliding(Touch& touch, const Vec3& slide, double matters) const {
+    const Slip old = touch.slip;
+    Slip& slip = touch.slip;
+    slip.known = true;
+    slip.limit = touch.contact.friction * touch.normalImpulse;
+    slip.speed = slide.norm();
+    const bool turns = old.known && slide.dot(old.direction) <= 0.0;
+    if ((turns || slip.speed < slowest()) && touch.flips < kMostFlips) {
+        touch.sticks = true;
+        slip.held.setZero();
+        ++touch.flips;
+        return true;
+    }
+    const bool damped = turns || touch.flips >= kMostFlips || slip.speed == 0.0;
+    slip.direction = damped ? Vec3::Zero() : Vec3(slide / slip.speed);
+    return (slip.limit * slip.direction - (old.known ? old.limit : 0.0) * old.direction).norm() > matters;
+}
+
+void ContactResponse::moveToEnd(const IslandVelocities& solved, const Points& y) {
     m_end.resize(m_input.shells.size());
-    std::vector<const Points*> positions;
     for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
         const auto n = m_input.shells[k]->vertexCount();
         m_end[k] = m_input.shells[k]->positions() + m_input.h * solved.v.middleCols(m_offsets[k], n) +
                    y.middleCols(m_offsets[k], n);
-        positions.push_back(&m_end[k]);
     }
-    std::vector<Vec6> twists(m_input.bodies.size());
-    for (std::size_t b = 0; b < twists.size(); ++b)
-        twists[b] = m_dynamicIndex[b] < 0 ? m_input.bodies[b].freeTwist : Vec6(solved.w.col(m_dynamicIndex[b]));
+    m_endTwists.resize(m_input.bodies.size());
+    for (std::size_t b = 0; b < m_endTwists.size(); ++b)
+        m_endTwists[b] = m_dynamicIndex[b] < 0 ? m_input.bodies[b].freeTwist : Vec6(solved.w.col(m_dynamicIndex[b]));
+}
 
+bool ContactResponse::checkEnd(const IslandVelocities& solved, const Points& y, int round) {
+    moveToEnd(solved, y);
+    std::vector<const Points*> positions;
+    for (const Points& end : m_end) positions.push_back(&end);
     m_found.clear();
-    m_input.contacts->find({positions, twists, m_input.h}, -m_vertexSlop, -m_faceSlop, m_found);
+    m_input.contacts->find({positions, m_endTwists, m_input.h}, -m_vertexSlop, -m_faceSlop, m_found);
     std::sort(m_found.begin(), m_found.end(), [](const Contact& a, const Contact& b) { return a.gap < b.gap; });
     m_deepestGap = 0.0;
     m_claimed.clear();
     bool changed = false;
     for (const Contact& contact : m_found) changed |= closeAtEnd(contact, solved, round);
+    if (m_anyFast) changed |= closeFirst(round);
     return changed && round + 1 < kMaxRounds;
 }
 
@@ -386,10 +565,9 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
         fresh ? contact.gap : contact.gap - m_touches[known->second].offset - m_touches[known->second].allowedGap;
     if (missing > -slop) return false;
     if (!contact.isVertex() && !held) {
-        // Nearly at a vertex or an edge, that feature says the same; and of features that share vertices the deepest
-        // comes first, for the others may be cured with it.
-        for (int a = 0; a < 3; ++a)
-            if (contact.weights[a] > 0.0 && contact.weights[a] < 0.1) return false;
+        // Nearly at a vertex, that says the same; and of features that share vertices the deepest comes first, for the
+        // others may be cured with it.
+        if (contact.weights.maxCoeff() > 1.0 - kNearEdge) return false;
         m_deepestGap = std::min(m_deepestGap, missing);
         if (liftVertices(contact, -missing)) return true;
         for (int a = 0; a < 3; ++a)
@@ -462,8 +640,8 @@ void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
         if (touch.impulse.isZero(0.0)) continue;  // took no part in the last solve
         impulses.push_back({touch.contact, touch.impulse, touch.sticks});
         if (touch.active && touch.normalImpulse > 0.0)
-            m_memory[keyOf(touch.contact)] = {touch.normalImpulse, touch.drag, touch.offset, touch.sticks,
-                                              touch.patience};
+            m_memory[keyOf(touch.contact)] = {touch.normalImpulse, touch.offset,        touch.sticks,
+                                              touch.slip,          touch.contact.point, touch.contact.isVertex()};
     }
 }
 

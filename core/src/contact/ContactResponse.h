@@ -45,8 +45,18 @@ class ContactResponse {
     /// Contacts that carried an impulse; remembers them for the next step.
     void finish(std::vector<ContactImpulse>& impulses);
     double slop() const { return m_vertexSlop; }
+    /// Whether a fast body goes through a shell with these velocities.
+    bool passes(const IslandVelocities& solved, const Points& y);
 
   private:
+    /// Coulomb friction of a contact, as the next solve has it.
+    struct Slip {
+        bool known = false;       ///< false: no solve has told the normal impulse yet, no friction
+        double limit = 0.0;       ///< friction coefficient times normal impulse [N s]
+        Vec3 direction{0, 0, 0};  ///< of sliding, unit; 0: not known, friction is then a damping
+        double speed = 0.0;       ///< of sliding [m/s]
+        Vec3 held{0, 0, 0};       ///< impulse on a sticking soft row, its multiplier [N s]
+    };
     /// A contact through the rounds of one step.
     struct Touch {
         Contact contact;
@@ -55,20 +65,22 @@ class ContactResponse {
         double target = 0.0;      ///< least normal velocity relative to the body [m/s]
         double allowedGap = 0.0;  ///< <= 0: what it stood inside at the start and need not leave at once [m]
         bool active = false, sticks = false, isRow = false;
-        int patience = 0;                  ///< steps until it may be tried as sticking
         double lambda = 0.0, kappa = 0.0;  ///< soft rows: multiplier [N s] and penalty [kg]
-        double drag = 0.0;                 ///< friction as damping [kg]
-        double offset = 0.0;               ///< how far it is kept off the surface for its chords' sake [m]
-        double lifted = 0.0;               ///< by how much that grew in this round [m]
+        Slip slip;
+        int flips = 0;        ///< between sticking and sliding, in this step
+        double offset = 0.0;  ///< how far it is kept off the surface for its chords' sake [m]
+        double lifted = 0.0;  ///< by how much that grew in this round [m]
         double normalImpulse = 0.0;
         Vec3 impulse{0, 0, 0};  ///< on the shell [N s]
         int changes = 0;        ///< how often it was activated or dropped
     };
     using Key = std::tuple<const void*, const void*, int>;  ///< shell, body, feature
     struct Memory {
-        double impulse, drag, offset;
+        double impulse, offset;
         bool sticks;
-        int patience;
+        Slip slip;
+        Vec3 point;
+        bool isVertex;
     };
     /// The contacts that share one vertex's filter entry: up to three normals, against bodies of prescribed motion, or
     /// one against a dynamic body.
@@ -79,10 +91,18 @@ class ContactResponse {
     };
 
     Key keyOf(const Contact& c) const;
+    const Memory* remembered(const Contact& c) const;
     Touch makeTouch(const Contact& contact) const;
     void place(Touch& touch, const Contact& contact) const;
     Vec3 relativeVelocity(const Touch& touch, const IslandVelocities& solved) const;
     double timeOfTouch(const Touch& touch) const;
+    void findFast();
+    void sweepAtStart();
+    void moveToEnd(const IslandVelocities& solved, const Points& y);
+    void sweepToEnd();
+    bool closeFirst(int round);
+    std::map<int, double> roomBesideFaces() const;
+    void addAtStart(const Contact& contact, const std::map<int, double>& room, Points& y);
     void keepEarliest();
     void alter(Touch& touch, Points& y) const;
     std::vector<VertexConstraint> holdConstraints() const;
@@ -92,7 +112,11 @@ class ContactResponse {
     double vertexStiffness(const CoupledSystem& system, const Touch& touch) const;
     void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);
     bool releasePulling(int round);
+    void addFriction(const Touch& touch, Mat3& damping, Vec3& load) const;
     bool updateFriction(const CoupledSystem& system, const IslandVelocities& solved);
+    bool updateSticking(Touch& touch, const Vec3& slide, double matters, double stiffness) const;
+    bool updateSliding(Touch& touch, const Vec3& slide, double matters) const;
+    double slowest() const { return 1e-3 * m_input.h * std::max(m_input.gravity.norm(), 1e-3); }
     bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
     bool closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round);
     bool liftVertices(const Contact& contact, double by);
@@ -106,9 +130,12 @@ class ContactResponse {
     std::map<Key, int> m_index;
     std::map<Key, Memory> m_memory;
     double m_memoryStep = 0.0;
-    std::vector<char> m_held;    ///< pinned or anchored
-    std::vector<double> m_edge;  ///< mean edge length of each shell [m]
-    std::vector<Points> m_end;
+    std::vector<char> m_held;       ///< pinned or anchored
+    std::vector<double> m_edge;     ///< mean edge length of each shell [m]
+    std::vector<Points> m_end;      ///< where the solved motion ends, of each shell
+    std::vector<Vec6> m_endTwists;  ///< of each body
+    std::vector<char> m_fast;       ///< per body: may pass a shell within the step
+    bool m_anyFast = false;
     std::vector<Contact> m_found;
     std::set<int> m_claimed;  ///< vertices of the soft rows that this round has added
     double m_vertexSlop = 0.0, m_faceSlop = 0.0, m_deepestGap = 0.0;

@@ -120,7 +120,7 @@ void CoupledSystem::residual(const CoupledVector& u, CoupledVector& r, Points& u
     for (const auto& c : m_constraints) {
         const Vec3 f = unfiltered.col(c.vertex);
         if (c.body >= 0) r.w.col(c.body) += pointImpulse(f, c.arm);
-        r.s.col(c.vertex) = c.free * (f - c.damping * u.s.col(c.vertex));
+        r.s.col(c.vertex) = c.free * (f + c.load - c.damping * u.s.col(c.vertex));
     }
 }
 

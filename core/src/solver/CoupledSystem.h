@@ -29,7 +29,8 @@ struct VertexConstraint {
     Vec3 z = Vec3::Zero();        ///< prescribed part of s [m/s]
     Vec3 arm = Vec3::Zero();      ///< vertex minus centre of mass [m]
     Vec3 carried = Vec3::Zero();  ///< surface velocity of a prescribed body [m/s]
-    Mat3 damping = Mat3::Zero();  ///< friction as a damping of s [N s^2/m = kg]
+    Mat3 damping = Mat3::Zero();  ///< friction as a damping of s [kg]
+    Vec3 load = Vec3::Zero();     ///< friction that does not depend on s: an impulse on the vertex [N s]
 };
 
 /// An implicit soft row on the velocity u of a shell's point relative to a body: adds 1/2 u.(stiffness u) - load.u.

@@ -79,6 +79,7 @@ class ShellBody {
 
   private:
     friend class ShellWorld;
+    friend class FastBodies;
     friend class IslandFinder;
     ShellBody(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options);
     struct Anchor {

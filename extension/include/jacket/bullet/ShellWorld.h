@@ -22,6 +22,8 @@ struct WorldReport {
     bool finite = true;        ///< false: a shell's step was rejected; it stood still
     int rejectedSteps = 0;     ///< since the world was made
     int unconvergedSteps = 0;  ///< since the world was made
+    int passedSteps = 0;       ///< since the world was made: those in which a fast body went through a shell
+    bool limited = false;      ///< deformation was cut short, or a step would have gained energy
     double secondsContact = 0.0, secondsSolve = 0.0;
 };
 
