@@ -91,6 +91,7 @@ Shell::Shell(Shell&&) noexcept = default;
 Shell& Shell::operator=(Shell&&) noexcept = default;
 
 void Shell::setPositions(const Points& x) {
+    ++m_revision;
     requireSize(x, vertexCount(), "Shell positions");
     m_x = x;
     m_y.setZero();
@@ -100,6 +101,7 @@ void Shell::setPositions(const Points& x) {
 }
 
 void Shell::setVelocities(const Points& v) {
+    ++m_revision;
     requireSize(v, vertexCount(), "Shell velocities");
     m_v = v;
     m_lastH = 0.0;
@@ -117,6 +119,7 @@ void Shell::requireVertex(int vertex, const char* what) const {
 }
 
 void Shell::pin(int vertex) {
+    ++m_revision;
     requireVertex(vertex, "Shell::pin");
     m_pinCount += m_pinned[vertex] || isGuided(vertex) ? 0 : 1;
     m_pinned[vertex] = 1;
@@ -124,6 +127,7 @@ void Shell::pin(int vertex) {
 }
 
 void Shell::movePin(int vertex, const Vec3& target) {
+    ++m_revision;
     requireVertex(vertex, "Shell::movePin");
     requireFinite(target, "Shell::movePin: target");
     pin(vertex);
@@ -131,6 +135,7 @@ void Shell::movePin(int vertex, const Vec3& target) {
 }
 
 void Shell::unpin(int vertex) {
+    ++m_revision;
     requireVertex(vertex, "Shell::unpin");
     m_pinCount -= m_pinned[vertex] || isGuided(vertex) ? 1 : 0;
     m_pinned[vertex] = 0;
@@ -141,12 +146,14 @@ void Shell::unpin(int vertex) {
 }
 
 void Shell::setForce(int vertex, const Vec3& force) {
+    ++m_revision;
     requireVertex(vertex, "Shell::setForce");
     requireFinite(force, "Shell::setForce: force");
     m_force.col(vertex) = force;
 }
 
 void Shell::setPressure(double pressure) {
+    ++m_revision;
     if (!std::isfinite(pressure)) throw std::invalid_argument("Shell::setPressure: pressure [Pa] must be finite");
     m_pressure = pressure;
 }

@@ -70,6 +70,7 @@ void requireOnPlane(const std::vector<int>& vertices, const Points& x, const Vec
 }  // namespace
 
 void Shell::guide(int vertex, const Vec3& direction) {
+    ++m_revision;
     requireVertex(vertex, "Shell::guide");
     if (!direction.allFinite() || !(direction.norm() > 0.0))
         throw std::invalid_argument("Shell::guide: direction must be finite and not zero");
@@ -92,6 +93,7 @@ Mat3 Shell::freedom(int vertex) const {
 }
 
 void Shell::clamp(const std::vector<int>& vertices, std::optional<Vec3> direction) {
+    ++m_revision;
     if (vertices.size() < 2) throw std::invalid_argument("Shell::clamp: needs at least two vertices");
     std::vector<char> set(vertexCount(), 0);
     for (const int i : vertices) {
@@ -120,6 +122,7 @@ void Shell::clamp(const std::vector<int>& vertices, std::optional<Vec3> directio
 }
 
 void Shell::mirror(const std::vector<int>& vertices, const Vec3& normal) {
+    ++m_revision;
     if (vertices.empty()) throw std::invalid_argument("Shell::mirror: needs vertices");
     if (!normal.allFinite() || !(normal.norm() > 0.0))
         throw std::invalid_argument("Shell::mirror: normal must be finite and not zero");
@@ -137,6 +140,7 @@ void Shell::mirror(const std::vector<int>& vertices, const Vec3& normal) {
 }
 
 void Shell::setRestPositions(const Points& rest) {
+    ++m_revision;
     TriangleMesh mesh{rest, m_mesh->triangles()};
     if (rest.cols() != vertexCount())
         throw std::invalid_argument("Shell::setRestPositions: must have " + std::to_string(vertexCount()) +
@@ -148,6 +152,7 @@ void Shell::setRestPositions(const Points& rest) {
 }
 
 void Shell::flattenRest() {
+    ++m_revision;
     m_design->flattened = true;
     rebuild();
 }

@@ -7,6 +7,7 @@
 
 #include "Convert.h"
 #include "ShellProxy.h"
+#include "Sleepers.h"
 
 namespace jacket::bullet {
 namespace {
@@ -51,6 +52,7 @@ ShellBody::ShellBody(const TriangleMesh& mesh, const ShellMaterial& material, co
       m_options(options),
       m_contactThickness(options.contactThickness < 0.0 ? 0.5 * material.thickness : options.contactThickness),
       m_positions(mesh.positions.cols()),
+      m_rest(std::make_unique<ShellRest>()),
       m_proxy(std::make_unique<Proxy>(*this)) {
     publish();
 }
@@ -98,6 +100,35 @@ void ShellBody::anchor(int vertex, btRigidBody& body) {
         throw std::out_of_range("ShellBody::anchor: vertex must be 0.." + std::to_string(vertexCount() - 1) + ", got " +
                                 std::to_string(vertex));
     m_anchors.push_back({vertex, &body, body.getWorldTransform().inverse() * m_positions[vertex]});
+}
+
+bool ShellBody::isAsleep() const {
+    return m_rest->asleep && !m_rest->wakeAsked;
+}
+
+void ShellBody::activate() {
+    m_rest->wakeAsked = true;
+}
+
+void ShellBody::fallAsleep() {
+    m_shell.setVelocities(Points::Zero(3, vertexCount()));
+    m_pendingGravity.setZero();
+    m_hasVelocity = true;
+}
+
+BodyContact ShellBody::describe(const ContactImpulse& impulse, btCollisionObject& object) const {
+    BodyContact result{impulse, &object};
+    const HalfEdgeMesh& mesh = m_shell.mesh();
+    const auto& vertices = impulse.contact.vertices;
+    if (impulse.contact.isVertex()) {
+        result.triangle = mesh.trianglesAround(vertices[0]).front();
+        for (int a = 0; a < 3; ++a) result.barycentric[a] = triangles()(a, result.triangle) == vertices[0] ? 1.0 : 0.0;
+        return result;
+    }
+    for (const int t : mesh.trianglesAround(vertices[0]))
+        if (Eigen::Map<const Eigen::Vector3i>(vertices.data()) == triangles().col(t)) result.triangle = t;
+    result.barycentric = impulse.contact.weights;
+    return result;
 }
 
 void ShellBody::setPositions(std::span<const btVector3> positions) {

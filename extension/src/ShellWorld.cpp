@@ -10,12 +10,15 @@
 #include <map>
 #include <optional>
 #include <stdexcept>
+#include <unordered_map>
 
 #include "Convert.h"
 #include "FastBodies.h"
 #include "Islands.h"
 #include "ShellContacts.h"
 #include "ShellProxy.h"
+#include "Sleepers.h"
+#include "WarmStart.h"
 #include "jacket/Island.h"
 
 namespace jacket::bullet {
@@ -59,13 +62,20 @@ struct CarriedVertex {
     std::optional<Vec3> anchor;  ///< where the vertex is tied, in the body's frame
 };
 
+/// What the shells gave a body in a step, as one impulse.
+struct Push {
+    Vec3 impulse = Vec3::Zero();  ///< [N s]
+    bool isNew = false;           ///< of this step
+};
+
 struct ShellWorld::Impl {
     Obstacles obstacles;
     std::map<const ShellBody*, IslandSolver> solvers;  ///< of each island, by its first shell
     std::vector<CarriedVertex> carried;
     FastBodies::Solved solved;
+    std::unordered_map<const btCollisionObject*, Push> pushes;
     Wind wind;
-    bool hasWind = false;
+    bool hasWind = false, windChanged = false;
 };
 
 ShellWorld::ShellWorld(btDynamicsWorld& world) : m_world(world), m_impl(std::make_unique<Impl>()) {
@@ -80,7 +90,7 @@ ShellWorld::~ShellWorld() {
 ShellBody& ShellWorld::add(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options) {
     std::unique_ptr<ShellBody> shell(new ShellBody(mesh, material, options));
     ShellBody& added = *shell;
-    updateBounds(added, 1.0 / 60.0);
+    updateBounds(added, fastestObject(m_world), 1.0 / 60.0);
     m_shells.push_back(std::move(shell));
     m_world.addCollisionObject(added.m_proxy.get(), options.collisionGroup, options.collisionMask);
     m_report.shells = size();
@@ -91,7 +101,8 @@ void ShellWorld::remove(ShellBody& shell) {
     const auto found = std::find_if(m_shells.begin(), m_shells.end(), [&](const auto& s) { return s.get() == &shell; });
     if (found == m_shells.end()) throw std::invalid_argument("ShellWorld::remove: the shell is not in this world");
     m_world.removeCollisionObject(shell.m_proxy.get());
-    m_impl->solvers.clear();  // they remember contacts by shell
+    Sleepers(m_world, m_impl->obstacles, m_shells).wakeUp(shell);  // and what lay on it
+    m_impl->solvers.clear();                                       // they remember contacts by shell
     m_impl->carried.clear();
     m_shells.erase(found);
     m_report.shells = size();
@@ -99,10 +110,11 @@ void ShellWorld::remove(ShellBody& shell) {
 
 void ShellWorld::setWind(const Wind& wind) {
     m_impl->wind = wind;
-    m_impl->hasWind = true;
+    m_impl->hasWind = m_impl->windChanged = true;
 }
 
 void ShellWorld::clearWind() {
+    m_impl->windChanged = m_impl->windChanged || m_impl->hasWind;
     m_impl->hasWind = false;
 }
 
@@ -114,12 +126,14 @@ std::vector<std::string> ShellWorld::takeWarnings() {
 /// shells move along with the velocities of the same solve, so that shells and bodies are drawn at the same instant;
 /// then the next solve looks at this configuration, and its impulses enter Bullet's next solve.
 void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
-    if (m_shells.empty() || !(h > btScalar(0))) return;
+    if (!(h > btScalar(0))) return;
+    if (m_shells.empty()) return forgetPushes(*world);
     WorldReport report{.shells = size()};
     report.rejectedSteps = m_report.rejectedSteps;
     report.unconvergedSteps = m_report.unconvergedSteps;
     report.passedSteps = m_report.passedSteps;
     m_report = report;
+    const Vec3 gravity = fromBullet(m_world.getGravity());
     std::vector<ShellBody*> all;
     for (const auto& shell : m_shells) all.push_back(shell.get());
     solveNewcomers(*world, double(h));
@@ -127,9 +141,16 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     moveShells(*world, double(h));
     fast.holdBack();
     m_impl->solved.clear();
-    for (Island& island : IslandFinder(*world, m_impl->obstacles, all).find(double(h), false))
-        solveIsland(island, double(h));
-    for (const auto& shell : m_shells) updateBounds(*shell, double(h));
+    Sleepers sleepers(*world, m_impl->obstacles, m_shells);
+    sleepers.wake(gravity, double(h), std::exchange(m_impl->windChanged, false));
+    std::erase_if(all, [](const ShellBody* shell) { return shell->isAsleep(); });
+    m_report.awake = static_cast<int>(all.size());
+    if (!all.empty())
+        for (Island& island : IslandFinder(*world, m_impl->obstacles, all).find(double(h), false))
+            solveIsland(island, double(h));
+    forgetPushes(*world);
+    sleepers.rest(gravity, double(h));
+    updateAllBounds(double(h));
 }
 
 /// Shells that were added, or given a velocity, since the last step have no solved velocity to move with: they get one
@@ -137,14 +158,14 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
 void ShellWorld::solveNewcomers(btCollisionWorld& world, double h) {
     std::vector<ShellBody*> newcomers;
     for (const auto& shell : m_shells)
-        if (!shell->m_hasVelocity) newcomers.push_back(shell.get());
+        if (!shell->m_hasVelocity && !shell->isAsleep()) newcomers.push_back(shell.get());
     if (newcomers.empty()) return;
     for (Island& island : IslandFinder(world, m_impl->obstacles, newcomers).find(h, true)) solveIsland(island, h);
 }
 
 void ShellWorld::moveShells(btCollisionWorld& world, double h) {
     for (const auto& shell : m_shells)
-        if (shell->m_hasVelocity) shell->m_shell.advance(h);
+        if (shell->m_hasVelocity && !shell->isAsleep()) shell->m_shell.advance(h);
     for (const CarriedVertex& c : m_impl->carried) {
         if (!contains(world, c.object)) continue;
         Shell& shell = m_shells[c.shell]->m_shell;
@@ -157,7 +178,7 @@ void ShellWorld::moveShells(btCollisionWorld& world, double h) {
     for (const auto& shell : m_shells) {
         auto& anchors = shell->m_anchors;  // a removed body lets go
         std::erase_if(anchors, [&](const auto& a) { return !contains(world, a.body); });
-        shell->publish();
+        if (!shell->isAsleep()) shell->publish();
     }
 }
 
@@ -202,7 +223,7 @@ void ShellWorld::accept(Island& island, const StepReport& report, const std::vec
     if (!report.finite) return;
     for (const ContactImpulse& impulse : report.contacts) {
         ShellBody& shell = *island.shells[impulse.contact.shell];
-        shell.m_contacts.push_back(impulse);
+        shell.m_contacts.push_back(shell.describe(impulse, *island.obstacles[impulse.contact.body].object));
         if (impulse.contact.isVertex())
             carry(shell, impulse.contact.vertices[0], island, impulse.contact.body, coupled, nullptr);
     }
@@ -228,30 +249,58 @@ void ShellWorld::carry(const ShellBody& shell, int vertex, const Island& island,
 void ShellWorld::react(btCollisionObject& object, const CoupledBody& coupled) {
     btRigidBody* body = btRigidBody::upcast(&object);
     if (!body || body->isStaticOrKinematicObject() || coupled.impulse.isZero(0.0)) return;
-    const double kick = double(body->getInvMass()) * coupled.impulse.head<3>().norm();
-    const double still = 0.02 * double(m_world.getGravity().length()) / 60.0;
-    if (kick > still) body->activate();  // a feather does not wake a sleeping crate
+    const Vec3 impulse = coupled.impulse.head<3>();
+    Push& last = m_impl->pushes[&object];
+    if (!body->isActive()) {  // a feather does not wake a sleeping crate, nor does what it fell asleep under
+        const double kick = double(body->getInvMass()) * (impulse - last.impulse).norm();
+        if (kick > 0.02 * double(m_world.getGravity().length()) / 60.0) body->activate();
+    }
+    foretellLoad(*m_world.getDispatcher(), object, impulse - last.impulse);
+    last = {impulse, true};
     if (!body->isActive()) return;
     body->applyCentralImpulse(toBullet(Vec3(coupled.impulse.head<3>())));
     body->applyTorqueImpulse(toBullet(Vec3(coupled.impulse.tail<3>())));
 }
 
-void ShellWorld::updateBounds(ShellBody& shell, double h) {
+/// Bodies that no shell pushes any more.
+void ShellWorld::forgetPushes(const btCollisionWorld& world) {
+    for (auto it = m_impl->pushes.begin(); it != m_impl->pushes.end();) {
+        auto& [object, push] = *it;
+        const bool isHere = contains(world, object);
+        if (isHere && (std::exchange(push.isNew, false) || !object->isActive())) {
+            ++it;
+            continue;
+        }
+        if (isHere) foretellLoad(*m_world.getDispatcher(), *object, -push.impulse);
+        it = m_impl->pushes.erase(it);
+    }
+}
+
+/// Bounds of sleeping shells stay, unless something has become faster than they allow for.
+void ShellWorld::updateAllBounds(double h) {
+    const double fastest = fastestObject(m_world);
+    for (const auto& shell : m_shells)
+        if (!shell->isAsleep() || fastest > shell->m_rest->boundsSpeed) updateBounds(*shell, fastest, h);
+}
+
+void ShellWorld::updateBounds(ShellBody& shell, double fastest, double h) {
     const Points& x = shell.m_shell.positions();
     const Points& v = shell.m_shell.velocities();
     Vec3 lower = x.rowwise().minCoeff(), upper = x.rowwise().maxCoeff();
-    const double ahead = 2.0 * h * (fastestObject(m_world) + v.colwise().norm().maxCoeff()) +
+    const double ahead = 2.0 * h * (fastest + v.colwise().norm().maxCoeff()) +
                          4.0 * h * h * double(m_world.getGravity().length()) + shell.contactThickness() + 1e-3;
     lower.array() -= ahead;
     upper.array() += ahead;
     shell.m_proxy->shape().setBounds(toBullet(lower), toBullet(upper));
+    shell.m_rest->boundsSpeed = fastest;
 }
 
 void ShellWorld::debugDraw(btIDebugDraw* drawer) {
     if (!drawer) return;
-    const btVector3 wire(0.2, 0.4, 0.8), pin(0.9, 0.6, 0.1), contact(0.9, 0.1, 0.1);
+    const btVector3 awake(0.2, 0.4, 0.8), asleep(0.5, 0.5, 0.5), pin(0.9, 0.6, 0.1), contact(0.9, 0.1, 0.1);
     for (const auto& shell : m_shells) {
         const auto x = shell->positions();
+        const btVector3& wire = shell->isAsleep() ? asleep : awake;
         for (const auto& e : shell->shell().mesh().edges()) drawer->drawLine(x[e.v0], x[e.v1], wire);
         for (int i = 0; i < shell->vertexCount(); ++i)
             if (shell->shell().isPinned(i)) drawer->drawSphere(x[i], btScalar(0.01), pin);

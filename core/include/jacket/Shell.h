@@ -137,6 +137,9 @@ class Shell {
     void setPressure(double pressure);
     double pressure() const { return m_pressure; }
 
+    /// Changes whenever the caller changed the shell: state, supports, loads or rest shape; not as it moves by itself.
+    unsigned revision() const { return m_revision; }
+
     ShellEnergy energy() const;
     Vec3 linearMomentum() const;                    ///< [N s]
     Vec3 angularMomentum(const Vec3& about) const;  ///< [N m s]
@@ -183,6 +186,7 @@ class Shell {
     double m_plasticWork = 0.0;
     Dent m_dent;
     int m_pinCount = 0;
+    unsigned m_revision = 0;
     double m_pressure = 0.0;
     std::unique_ptr<ShellDesign> m_design;      ///< rest shape beyond positions, materials
     std::unique_ptr<ShellAssembly> m_assembly;  ///< energies and the step's matrix

@@ -34,9 +34,19 @@ struct ShellOptions {
     int collisionMask = -1;              ///< btBroadphaseProxy::AllFilter
     double contactThickness = -1.0;      ///< distance kept from surfaces [m]; < 0: half the shell's thickness
     Preconditioner preconditioner = Preconditioner::IncompleteCholesky;
+    bool sleeping = true;  ///< whether it may fall asleep: once no vertex has moved by 1 % of an edge for a while
 };
 
 class ShellWorld;
+struct ShellRest;
+
+/// A contact of a shell with one of Bullet's objects in the last substep. `contact.body` counts within the solve and
+/// says nothing here.
+struct BodyContact : ContactImpulse {
+    btCollisionObject* object = nullptr;  ///< what it touches
+    int triangle = -1;                    ///< of the shell; one of several for a point on an edge or a vertex
+    Vec3 barycentric{1, 0, 0};            ///< of the point in that triangle
+};
 
 /// One shell of a ShellWorld. Vertices are in the order of the mesh given to ShellWorld::add.
 class ShellBody {
@@ -63,6 +73,10 @@ class ShellBody {
     /// Ties a vertex to a body at their present distance. The body may be removed at any time, which frees the vertex.
     void anchor(int vertex, btRigidBody& body);
 
+    /// Asleep it stands still and costs nothing until something happens to it, or activate() is called.
+    bool isAsleep() const;
+    void activate();
+
     void setPositions(std::span<const btVector3> positions);
     void setVelocity(const btVector3& velocity);  ///< of every vertex
     void setName(std::string name) { m_name = std::move(name); }
@@ -73,7 +87,7 @@ class ShellBody {
     const ShellOptions& options() const { return m_options; }
     double contactThickness() const { return m_contactThickness; }
     /// Contacts that carried an impulse in the last substep.
-    std::span<const ContactImpulse> contacts() const { return m_contacts; }
+    std::span<const BodyContact> contacts() const { return m_contacts; }
     /// Linear momentum without the gravity of the coming substep, which Bullet's bodies have not received yet [N s].
     btVector3 linearMomentum() const;
 
@@ -81,6 +95,7 @@ class ShellBody {
     friend class ShellWorld;
     friend class FastBodies;
     friend class IslandFinder;
+    friend class Sleepers;
     ShellBody(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options);
     struct Anchor {
         int vertex;
@@ -92,10 +107,13 @@ class ShellBody {
     double m_contactThickness;
     std::string m_name;
     std::vector<Anchor> m_anchors;
-    std::vector<ContactImpulse> m_contacts;
+    std::vector<BodyContact> m_contacts;
     std::vector<btVector3> m_positions;
     mutable std::vector<btVector3> m_normals;
-    void publish();                        ///< copies positions for drawing
+    void publish();  ///< copies positions for drawing
+    void fallAsleep();
+    BodyContact describe(const ContactImpulse& impulse, btCollisionObject& object) const;
+    std::unique_ptr<ShellRest> m_rest;
     bool m_hasVelocity = false;            ///< a solve has been done for the coming motion
     Vec3 m_pendingGravity = Vec3::Zero();  ///< h g that the velocities hold and Bullet's bodies do not yet [m/s]
     class Proxy;                           ///< what Bullet's broadphase and ray tests see

@@ -17,7 +17,7 @@ struct Island;
 
 /// What the last substep cost and did, over all shells.
 struct WorldReport {
-    int shells = 0, contacts = 0, pcgIterations = 0, solves = 0;
+    int shells = 0, awake = 0, contacts = 0, pcgIterations = 0, solves = 0;
     bool converged = true;
     bool finite = true;        ///< false: a shell's step was rejected; it stood still
     int rejectedSteps = 0;     ///< since the world was made
@@ -63,7 +63,9 @@ class ShellWorld : public btActionInterface {
     void carry(const ShellBody& shell, int vertex, const Island& island, int body,
                const std::vector<CoupledBody>& coupled, const Vec3* anchor);
     void react(btCollisionObject& object, const CoupledBody& coupled);
-    void updateBounds(ShellBody& shell, double h);
+    void forgetPushes(const btCollisionWorld& world);
+    void updateAllBounds(double h);
+    void updateBounds(ShellBody& shell, double fastest, double h);
     btDynamicsWorld& m_world;
     std::vector<std::unique_ptr<ShellBody>> m_shells;
     WorldReport m_report;

@@ -1,0 +1,195 @@
+#include "Sleepers.h"
+
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "ShellContacts.h"
+#include "ShellProxy.h"
+
+namespace jacket::bullet {
+namespace {
+
+constexpr double kAtRest = 0.01;     // of the mean edge: a vertex that moves no farther keeps its place
+constexpr double kNearlyCalm = 0.9;  // of gDeactivationTime: as far as a body that touches an awake shell gets
+constexpr double kSlow = 0.01;       // a body slower than this wakes no shell that it comes near [m/s]
+
+double meanEdge(const Shell& shell) {
+    double sum = 0.0;
+    for (const auto& e : shell.mesh().edges())
+        sum += (shell.restPositions().col(e.v0) - shell.restPositions().col(e.v1)).norm();
+    return sum / static_cast<double>(shell.mesh().edges().size());
+}
+
+bool samePose(const btTransform& a, const btTransform& b) {
+    return (a.getOrigin() - b.getOrigin()).length2() < btScalar(1e-12) &&
+           (a.getBasis()[0] - b.getBasis()[0]).length2() + (a.getBasis()[1] - b.getBasis()[1]).length2() <
+               btScalar(1e-12);
+}
+
+bool sleeps(const btCollisionObject& object) {
+    return object.isStaticOrKinematicObject() || !object.isActive();
+}
+
+/// Whether Bullet would let it sleep by now.
+bool isCalm(const btCollisionObject& object) {
+    return sleeps(object) || object.getDeactivationTime() >= btScalar(kNearlyCalm) * gDeactivationTime;
+}
+
+/// Left alone, Bullet would put it to sleep: it knows of no contact with the shell.
+void keepAwake(btCollisionObject& object) {
+    if (sleeps(object) || object.getActivationState() == DISABLE_DEACTIVATION) return;
+    if (object.getActivationState() == WANTS_DEACTIVATION) object.setActivationState(ACTIVE_TAG);
+    object.setDeactivationTime(std::min(object.getDeactivationTime(), btScalar(kNearlyCalm) * gDeactivationTime));
+}
+
+void fallAsleep(btCollisionObject& object) {
+    if (sleeps(object)) return;
+    object.setActivationState(ISLAND_SLEEPING);
+    if (btRigidBody* body = btRigidBody::upcast(&object)) {
+        body->setLinearVelocity(btVector3(0, 0, 0));
+        body->setAngularVelocity(btVector3(0, 0, 0));
+    }
+}
+
+}  // namespace
+
+Sleepers::Sleepers(btCollisionWorld& world, Obstacles& obstacles, std::span<const std::unique_ptr<ShellBody>> shells)
+    : m_world(world), m_obstacles(obstacles), m_shells(shells) {}
+
+bool Sleepers::contains(const btCollisionObject* object) const {
+    const auto& objects = m_world.getCollisionObjectArray();
+    const int count = objects.size();
+    for (int i = 0; i < count; ++i)
+        if (objects[i] == object) return true;
+    return false;
+}
+
+void Sleepers::wakeUp(ShellBody& shell) {
+    ShellRest& rest = *shell.m_rest;
+    for (const auto& support : rest.supports)
+        if (contains(support.object) && !support.object->isStaticOrKinematicObject()) support.object->activate();
+    const double boundsSpeed = rest.boundsSpeed;
+    rest = {};
+    rest.boundsSpeed = boundsSpeed;
+}
+
+void Sleepers::wake(const Vec3& gravity, double h, bool disturbed) {
+    for (const auto& shell : m_shells)
+        if (shell->m_rest->asleep && (disturbed || isDisturbed(*shell, gravity))) wakeUp(*shell);
+    wakeTouched(h);
+}
+
+/// By its user, by gravity, or by what it lies on.
+bool Sleepers::isDisturbed(const ShellBody& shell, const Vec3& gravity) const {
+    const ShellRest& rest = *shell.m_rest;
+    if (rest.wakeAsked || rest.revision != shell.shell().revision() || rest.gravity != gravity) return true;
+    return std::any_of(rest.supports.begin(), rest.supports.end(), [&](const auto& support) {
+        return !contains(support.object) || !sleeps(*support.object) ||
+               !samePose(support.object->getWorldTransform(), support.pose);
+    });
+}
+
+/// By a body that comes.
+void Sleepers::wakeTouched(double h) {
+    btOverlappingPairCache& cache = *m_world.getBroadphase()->getOverlappingPairCache();
+    const auto asleep = [&](const btCollisionObject* object) {
+        const auto found = std::find_if(m_shells.begin(), m_shells.end(),
+                                        [&](const auto& s) { return s->m_proxy.get() == object && s->isAsleep(); });
+        return found == m_shells.end() ? nullptr : found->get();
+    };
+    for (int i = 0; i < cache.getNumOverlappingPairs(); ++i) {
+        const btBroadphasePair& pair = cache.getOverlappingPairArrayPtr()[i];
+        btCollisionObject* objects[] = {static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject),
+                                        static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject)};
+        for (const int k : {0, 1}) {
+            if (objects[k]->getInternalType() != btCollisionObject::CO_USER_TYPE) continue;
+            btCollisionObject& other = *objects[1 - k];
+            if (other.isStaticObject() || !other.isActive() || !other.hasContactResponse()) continue;
+            ShellBody* shell = asleep(objects[k]);
+            if (shell && shell->m_proxy->mayTouch(other) && touches(*shell, other, h)) wakeUp(*shell);
+        }
+    }
+}
+
+bool Sleepers::touches(const ShellBody& shell, btCollisionObject& object, double h) {
+    const std::vector<Obstacle> obstacle{m_obstacles.make(object, h, *m_world.getDispatcher(), true)};
+    const double speed = obstacle[0].body.freeTwist.head<3>().norm() +
+                         obstacle[0].body.freeTwist.tail<3>().norm() * std::min(obstacle[0].body.radius, 1e3);
+    if (speed < kSlow) return false;
+    ShellContacts contacts({&shell}, obstacle, {{0, 0}});
+    const Points* positions = &shell.shell().positions();
+    std::vector<Contact> found;
+    const double reach = 2.0 * h * speed + shell.contactThickness();
+    contacts.find({{&positions, 1}, {&obstacle[0].body.freeTwist, 1}, h}, reach, reach, found);
+    return !found.empty();
+}
+
+std::vector<btCollisionObject*> Sleepers::supportsOf(const ShellBody& shell) const {
+    std::vector<btCollisionObject*> supports;
+    for (const auto& contact : shell.contacts()) supports.push_back(contact.object);
+    for (const auto& anchor : shell.m_anchors) supports.push_back(anchor.body);
+    std::sort(supports.begin(), supports.end());
+    supports.erase(std::unique(supports.begin(), supports.end()), supports.end());
+    return supports;
+}
+
+void Sleepers::rest(const Vec3& gravity, double h) {
+    if (gDisableDeactivation) return;
+    std::vector<Candidate> candidates;
+    for (const auto& shell : m_shells) {
+        ShellRest& rest = *shell->m_rest;
+        if (std::exchange(rest.wakeAsked, false)) rest.place.resize(3, 0);
+        if (rest.asleep) continue;
+        candidates.push_back({shell.get(), supportsOf(*shell), keepsPlace(*shell, h)});
+        for (btCollisionObject* object : candidates.back().supports) keepAwake(*object);
+    }
+    dropRestless(candidates);
+    for (const Candidate& c : candidates) {
+        if (!c.ready) continue;
+        ShellRest& rest = *c.shell->m_rest;
+        c.shell->fallAsleep();
+        rest.asleep = true;
+        rest.revision = c.shell->shell().revision();
+        rest.gravity = gravity;
+        for (btCollisionObject* object : c.supports) {
+            jacket::bullet::fallAsleep(*object);
+            rest.supports.push_back({object, object->getWorldTransform()});
+        }
+    }
+}
+
+/// Whether no vertex has left its place for as long as Bullet waits.
+bool Sleepers::keepsPlace(ShellBody& shell, double h) const {
+    ShellRest& rest = *shell.m_rest;
+    if (!shell.options().sleeping) return false;
+    const Points& x = shell.shell().positions();
+    const double room = kAtRest * meanEdge(shell.shell());
+    if (rest.place.cols() != x.cols() || (x - rest.place).colwise().squaredNorm().maxCoeff() > room * room) {
+        rest.place = x;
+        rest.quiet = 0.0;
+    }
+    rest.quiet += h;
+    return rest.quiet >= double(gDeactivationTime);
+}
+
+/// A shell stays awake with any body that it touches, and that with any shell that it touches.
+void Sleepers::dropRestless(std::vector<Candidate>& candidates) const {
+    for (bool changed = true; changed;) {
+        changed = false;
+        std::vector<btCollisionObject*> awake;
+        for (const Candidate& c : candidates)
+            if (!c.ready) awake.insert(awake.end(), c.supports.begin(), c.supports.end());
+        for (Candidate& c : candidates) {
+            const bool restless = std::any_of(c.supports.begin(), c.supports.end(), [&](const btCollisionObject* o) {
+                return !isCalm(*o) || (!sleeps(*o) && std::find(awake.begin(), awake.end(), o) != awake.end());
+            });
+            if (!c.ready || !restless) continue;
+            c.ready = false;
+            changed = true;
+        }
+    }
+}
+
+}  // namespace jacket::bullet

@@ -1,0 +1,60 @@
+#pragma once
+#include <LinearMath/btTransform.h>
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "Obstacles.h"
+#include "jacket/bullet/ShellBody.h"
+
+namespace jacket::bullet {
+
+/// What a shell needs to fall asleep and to know when to wake.
+struct ShellRest {
+    bool asleep = false;
+    bool wakeAsked = false;       ///< by the user, since the last step
+    double quiet = 0.0;           ///< for how long no vertex has left its place [s]
+    Points place;                 ///< where the vertices were when it began [m]
+    unsigned revision = 0;        ///< of the shell when it fell asleep
+    Vec3 gravity = Vec3::Zero();  ///< the world's then [m/s^2]
+    double boundsSpeed = 0.0;     ///< of other objects, that its bounds in the broadphase allow for [m/s]
+    struct Support {
+        btCollisionObject* object;
+        btTransform pose;
+    };
+    std::vector<Support> supports;  ///< what it touched or was tied to
+};
+
+/// Shells fall asleep and wake with what they touch. Bullet sees no contact between the two, so it is done here: a body
+/// that touches a restless shell is kept awake, and a shell sleeps once it has kept its place for Bullet's
+/// gDeactivationTime and all that it touches is as calm, together with that.
+class Sleepers {
+  public:
+    Sleepers(btCollisionWorld& world, Obstacles& obstacles, std::span<const std::unique_ptr<ShellBody>> shells);
+    /// Wakes shells whose world has changed. `disturbed`: all of them, since the wind has.
+    void wake(const Vec3& gravity, double h, bool disturbed);
+    /// After the step: counts how long shells have kept their place, and lets them sleep together with their bodies.
+    void rest(const Vec3& gravity, double h);
+    /// Together with the bodies that it touched.
+    void wakeUp(ShellBody& shell);
+
+  private:
+    struct Candidate {
+        ShellBody* shell;
+        std::vector<btCollisionObject*> supports;
+        bool ready;
+    };
+    bool keepsPlace(ShellBody& shell, double h) const;
+    void dropRestless(std::vector<Candidate>& candidates) const;
+    bool isDisturbed(const ShellBody& shell, const Vec3& gravity) const;
+    void wakeTouched(double h);
+    bool touches(const ShellBody& shell, btCollisionObject& object, double h);
+    std::vector<btCollisionObject*> supportsOf(const ShellBody& shell) const;
+    bool contains(const btCollisionObject* object) const;
+    btCollisionWorld& m_world;
+    Obstacles& m_obstacles;
+    std::span<const std::unique_ptr<ShellBody>> m_shells;
+};
+
+}  // namespace jacket::bullet
