@@ -271,11 +271,13 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
         atStart += elastic;
         gain += shell.elasticEnergy(shell.positions() + y.middleCols(offsets[k], n) + stepOf[k] * part) - elastic;
     }
+    Eigen::Matrix<double, 6, Eigen::Dynamic> freeMomentum, momentum;
+    system.momentum(freeTwist, freeMomentum);
+    system.momentum(u.w, momentum);
     for (std::size_t b = 0; b < dynamicBodies.size(); ++b) {
-        const CoupledBody& body = input.bodies[dynamicBodies[b]];
-        const double kinetic = 0.5 * body.freeTwist.dot(body.mass * body.freeTwist);
+        const double kinetic = 0.5 * freeTwist.col(b).dot(freeMomentum.col(b));
         atStart += kinetic;
-        gain += 0.5 * u.w.col(b).dot(body.mass * u.w.col(b)) - kinetic;
+        gain += 0.5 * u.w.col(b).dot(momentum.col(b)) - kinetic;
     }
     for (const auto& held : system.constraints())  // work of pins and bodies that are moved
         if (held.body < 0) gain -= std::max(0.0, -unfiltered.col(held.vertex).dot(held.carried));
@@ -302,7 +304,12 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
         mass.push_back(input.bodies[b].mass);
         twists.push_back(input.bodies[b].freeTwist);
     }
-    system.begin(std::move(parts), static_cast<int>(start.cols()), std::move(mass), std::move(twists));
+    std::vector<BodyCoupling> couplings;
+    for (const BodyCoupling& c : input.couplings)
+        if (dynamicIndex[c.a] >= 0 && dynamicIndex[c.b] >= 0)
+            couplings.push_back({dynamicIndex[c.a], dynamicIndex[c.b], c.mass});
+    system.begin(std::move(parts), static_cast<int>(start.cols()), std::move(mass), std::move(twists),
+                 std::move(couplings));
 }
 
 /// A tenth of what gravity does in a step, so that a scene at rest is not solved to the last bit of nothing.
@@ -359,11 +366,13 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
 
 void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
     response.finish(report.contacts);
+    Eigen::Matrix<double, 6, Eigen::Dynamic> change;
+    system.momentum(u.w - freeTwist, change);
     for (std::size_t b = 0; b < input.bodies.size(); ++b) {
         CoupledBody& body = input.bodies[b];
         body.twist = body.prescribed ? body.freeTwist : Vec6(u.w.col(dynamicIndex[b]));
         // The solved change of momentum, not the sum of the contacts' impulses: a light body would feel their residual.
-        body.impulse = body.prescribed ? Vec6::Zero() : Vec6(body.mass * (body.twist - body.freeTwist));
+        body.impulse = body.prescribed ? Vec6::Zero() : Vec6(change.col(dynamicIndex[b]));
     }
     balance(input, report.contacts);
     for (std::size_t k = 0; k < input.shells.size(); ++k) {

@@ -391,6 +391,21 @@ struct Island {
         rows.push_back(row);
     }
 
+    /// Joins bodies by stiff rows between them, some pairs more than once; the rows' terms are the couplings.
+    void couple(const Pairs& pairs) {
+        std::vector<Mat6> masses = system.mass();
+        std::vector<BodyCoupling> couplings;
+        for (const auto& [a, b] : pairs) {
+            const auto row = randomMatrix<Eigen::Matrix<double, 2, 12>>(random);
+            const Eigen::Matrix<double, 12, 12> term = 3.0 * row.transpose() * row;
+            masses[a] += term.topLeftCorner<6, 6>();
+            masses[b] += term.bottomRightCorner<6, 6>();
+            couplings.push_back({a, b, term.topRightCorner<6, 6>()});
+        }
+        const std::vector<CoupledSystem::ShellPart> parts(system.shells().begin(), system.shells().end());
+        system.begin(parts, system.vertexCount(), masses, system.freeTwist(), couplings);
+    }
+
     void finish() { system.setContacts(constraints, rows); }
 };
 
@@ -424,8 +439,14 @@ struct DenseIsland {
         }
         for (int b = 0; b < system.bodyCount(); ++b) {
             H.block<6, 6>(bodyAt(b), bodyAt(b)) = system.mass()[b];
-            g.segment<6>(bodyAt(b)) = system.mass()[b] * system.freeTwist()[b];
         }
+        for (const auto& coupling : system.couplings()) {
+            H.block<6, 6>(bodyAt(coupling.a), bodyAt(coupling.b)) += coupling.mass;
+            H.block<6, 6>(bodyAt(coupling.b), bodyAt(coupling.a)) += coupling.mass.transpose();
+        }
+        for (int b = 0; b < system.bodyCount(); ++b)
+            g.tail(6 * system.bodyCount()) +=
+                H.bottomRows(6 * system.bodyCount()).middleCols<6>(bodyAt(b)) * system.freeTwist()[b];
         for (const auto& row : system.rows()) addRow(row);
         for (const auto& constraint : system.constraints()) addConstraint(constraint);
     }
@@ -524,7 +545,7 @@ TEST(FilteredPcgTest, FreeSystemEqualsDense) {
 
 TEST(FilteredPcgTest, EveryNumberOfFreeDirectionsEqualsDense) {
     for (int held = 0; held <= 3; ++held) {
-        SCOPED_TRACE(std::to_string(3 - held) + " free directions");
+        SCOPED_TRACE(::testing::Message() << 3 - held << " free directions");
         Island island(9 + held, {20}, 0);
         for (const int vertex : {0, 3, 4, 11, 19}) island.hold(vertex, held, -1);
         island.finish();
@@ -565,6 +586,28 @@ TEST(FilteredPcgTest, LightAndHeavyBodiesEqualDense) {
 }
 
 /// Matrix of the filtered operator.
+TEST(FilteredPcgTest, CoupledBodiesEqualDense) {
+    Island island(40, {13, 8}, 5);
+    island.couple({{0, 3}, {4, 1}, {3, 4}, {0, 3}});  // 2 stays alone
+    makeBusy(island, 2.0);
+    expectDenseSolution(island.system);
+}
+
+/// Without contacts the preconditioner of the bodies is the inverse of their operator.
+TEST(FilteredPcgTest, GroupsOfCoupledBodiesAreFactoredExactly) {
+    Island island(41, {9}, 4);
+    island.couple({{2, 0}, {3, 2}, {2, 0}});
+    island.finish();
+    CoupledPreconditioner preconditioner;
+    preconditioner.build(island.system, Preconditioner::BlockJacobi);
+    CoupledVector u, r, z;
+    for (CoupledVector* vector : {&u, &r, &z}) vector->resize(9, 4);
+    u.w = Eigen::Matrix<double, 6, Eigen::Dynamic>::NullaryExpr(6, 4, [&] { return uniform(island.random, -1, 1); });
+    island.system.apply(u, r);
+    preconditioner.apply(island.system, r, z);
+    EXPECT_LT(test::relativeError(DenseVector(z.w.reshaped()), DenseVector(u.w.reshaped())), 1e-11);
+}
+
 Dense operatorOf(const CoupledSystem& system) {
     const int split = 3 * system.vertexCount(), size = split + 6 * system.bodyCount();
     Dense result(size, size);

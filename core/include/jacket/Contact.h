@@ -22,6 +22,14 @@ struct CoupledBody {
     Vec6 impulse = Vec6::Zero();  ///< out: what the shells gave it, exactly, about its centre of mass [N s, N m s]
 };
 
+/// An off-diagonal block of the bodies' common mass matrix: joints, or rigid contacts, make the momentum of one body
+/// depend on the twist of another. The whole matrix must be positive definite. Couplings of one pair add up; with a
+/// body of prescribed motion they do nothing.
+struct BodyCoupling {
+    int a = 0, b = 0;          ///< bodies, a != b
+    Mat6 mass = Mat6::Zero();  ///< M_ab: body a has momentum M_ab w_b, body b has M_ab^T w_a
+};
+
 /// Where a piece of a shell meets a body: one vertex (weights 1 0 0), or a point of an edge or triangle.
 struct Contact {
     int shell = 0;                  ///< index in the island

@@ -13,6 +13,7 @@ struct IslandInput {
     const Wind* wind = nullptr;  ///< none: no air
     std::span<Shell* const> shells{};
     std::span<CoupledBody> bodies{};  ///< `twist` and `impulse` are written
+    std::span<const BodyCoupling> couplings{};
     std::span<const Anchor> anchors{};
     ContactDetector* contacts = nullptr;  ///< none: no contacts
 };

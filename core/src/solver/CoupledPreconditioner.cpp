@@ -1,8 +1,24 @@
 #include "solver/CoupledPreconditioner.h"
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <numeric>
 
 namespace jacket {
+namespace {
+
+/// For every body the first body of its group.
+std::vector<int> groupLeaders(const CoupledSystem& system) {
+    std::vector<int> leader(system.bodyCount());
+    std::iota(leader.begin(), leader.end(), 0);
+    for (const auto& coupling : system.couplings()) {
+        const auto [low, high] = std::minmax(leader[coupling.a], leader[coupling.b]);
+        std::replace(leader.begin(), leader.end(), int(high), int(low));
+    }
+    return leader;
+}
+
+}  // namespace
 
 void CoupledPreconditioner::build(const CoupledSystem& system, Preconditioner kind) {
     m_kind = kind;
@@ -83,6 +99,32 @@ void CoupledPreconditioner::updateBodies(const CoupledSystem& system) {
         if (row.body >= 0) blocks[row.body] += pointStiffness(row.stiffness, row.arm);
     m_bodies.resize(blocks.size());
     for (std::size_t b = 0; b < blocks.size(); ++b) m_bodies[b].compute(blocks[b]);
+    m_groups.clear();
+    if (!system.couplings().empty()) factorGroups(system, blocks);
+}
+
+void CoupledPreconditioner::factorGroups(const CoupledSystem& system, const std::vector<Mat6>& blocks) {
+    const std::vector<int> leader = groupLeaders(system);
+    std::vector<int> place(leader.size());
+    for (int first = 0; first < system.bodyCount(); ++first) {
+        BodyGroup group;
+        for (int b = first; b < system.bodyCount(); ++b) {
+            if (leader[b] != first) continue;
+            place[b] = 6 * static_cast<int>(group.bodies.size());
+            group.bodies.push_back(b);
+        }
+        if (group.bodies.size() < 2) continue;
+        const auto size = 6 * static_cast<Eigen::Index>(group.bodies.size());
+        Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(size, size);
+        for (const int b : group.bodies) matrix.block<6, 6>(place[b], place[b]) = blocks[b];
+        for (const auto& c : system.couplings()) {
+            if (leader[c.a] != first) continue;
+            matrix.block<6, 6>(place[c.a], place[c.b]) += c.mass;
+            matrix.block<6, 6>(place[c.b], place[c.a]) += c.mass.transpose();
+        }
+        group.factor.compute(matrix);
+        m_groups.push_back(std::move(group));
+    }
 }
 
 void CoupledPreconditioner::apply(const CoupledSystem& system, const CoupledVector& r, CoupledVector& z) const {
@@ -96,6 +138,12 @@ void CoupledPreconditioner::apply(const CoupledSystem& system, const CoupledVect
         }
     }
     for (std::size_t b = 0; b < m_bodies.size(); ++b) z.w.col(b) = m_bodies[b].solve(r.w.col(b));
+    for (const BodyGroup& group : m_groups) {
+        Eigen::VectorXd part(6 * group.bodies.size());
+        for (std::size_t k = 0; k < group.bodies.size(); ++k) part.segment<6>(6 * k) = r.w.col(group.bodies[k]);
+        group.factor.solveInPlace(part);
+        for (std::size_t k = 0; k < group.bodies.size(); ++k) z.w.col(group.bodies[k]) = part.segment<6>(6 * k);
+    }
     system.filter(z);
 }
 

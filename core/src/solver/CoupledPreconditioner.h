@@ -9,7 +9,7 @@
 namespace jacket {
 
 /// P^-1 of an island: per shell 3x3 blocks or an incomplete factor of the filtered matrix, per body the 6x6 block
-/// M_b + sum_ij G_i^T A_ij G_j of the operator.
+/// M_b + sum_ij G_i^T A_ij G_j of the operator; bodies whose masses are coupled are factored together.
 class CoupledPreconditioner {
   public:
     void build(const CoupledSystem& system, Preconditioner kind);
@@ -22,11 +22,19 @@ class CoupledPreconditioner {
     void buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind);
     void addRows(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
     void filterBlocks(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
+    void factorGroups(const CoupledSystem& system, const std::vector<Mat6>& blocks);
+
+    /// Bodies that couplings join, directly or through others.
+    struct BodyGroup {
+        std::vector<int> bodies;
+        Eigen::LDLT<Eigen::MatrixXd> factor;
+    };
 
     std::vector<Mat3> m_diagonal, m_lower;  ///< scratch: filtered copy of one shell's matrix
     std::vector<IncompleteCholesky> m_factors;
     std::vector<std::vector<Mat3>> m_inverseBlocks;
     std::vector<Eigen::LDLT<Mat6>> m_bodies;
+    std::vector<BodyGroup> m_groups;
     Preconditioner m_kind = Preconditioner::BlockJacobi;
 };
 

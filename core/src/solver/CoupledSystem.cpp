@@ -24,11 +24,12 @@ Mat6 pointStiffness(const Mat3& k, const Vec3& arm) {
 }
 
 void CoupledSystem::begin(std::vector<ShellPart> shells, int vertexCount, std::vector<Mat6> mass,
-                          std::vector<Vec6> freeTwist) {
+                          std::vector<Vec6> freeTwist, std::vector<BodyCoupling> couplings) {
     m_shells = std::move(shells);
     m_vertexCount = vertexCount;
     m_mass = std::move(mass);
     m_freeTwist = std::move(freeTwist);
+    m_couplings = std::move(couplings);
     m_v.resize(3, vertexCount);
     m_q.resize(3, vertexCount);
     m_constraintOf.assign(vertexCount, -1);
@@ -81,12 +82,22 @@ Vec3 CoupledSystem::rowImpulse(const SoftRow& row, const Points& v,
     return row.load - row.stiffness * rowVelocity(row, v, w);
 }
 
+void CoupledSystem::momentum(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w,
+                             Eigen::Matrix<double, 6, Eigen::Dynamic>& result) const {
+    result.resize(6, bodyCount());
+    for (int b = 0; b < bodyCount(); ++b) result.col(b) = m_mass[b] * w.col(b);
+    for (const auto& c : m_couplings) {
+        result.col(c.a) += c.mass * w.col(c.b);
+        result.col(c.b) += c.mass.transpose() * w.col(c.a);
+    }
+}
+
 void CoupledSystem::apply(const CoupledVector& u, CoupledVector& q) const {
     m_v = u.s;
     for (const auto& c : m_constraints)
         if (c.body >= 0) m_v.col(c.vertex) += pointVelocity(u.w.col(c.body), c.arm);
     multiply(m_v, m_q);
-    for (int b = 0; b < bodyCount(); ++b) q.w.col(b) = m_mass[b] * u.w.col(b);
+    momentum(u.w, q.w);
     for (const auto& row : m_rows) {
         Vec3 velocity = Vec3::Zero();
         for (int a = 0; a < 3; ++a) velocity += row.weights[a] * m_v.col(row.vertices[a]);
@@ -110,7 +121,9 @@ void CoupledSystem::residual(const CoupledVector& u, CoupledVector& r, Points& u
     for (const auto& shell : m_shells)
         unfiltered.middleCols(shell.offset, shell.rhs->cols()) =
             *shell.rhs - m_q.middleCols(shell.offset, shell.rhs->cols());
-    for (int b = 0; b < bodyCount(); ++b) r.w.col(b) = m_mass[b] * (m_freeTwist[b] - u.w.col(b));
+    m_w.resize(6, bodyCount());
+    for (int b = 0; b < bodyCount(); ++b) m_w.col(b) = m_freeTwist[b] - u.w.col(b);
+    momentum(m_w, r.w);
     for (const auto& row : m_rows) {
         const Vec3 f = rowImpulse(row, m_v, u.w);
         for (int a = 0; a < 3; ++a) unfiltered.col(row.vertices[a]) += row.weights[a] * f;

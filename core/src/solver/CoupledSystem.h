@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "jacket/Contact.h"
 #include "solver/BlockMatrix.h"
 
 namespace jacket {
@@ -68,7 +69,9 @@ class CoupledSystem {
         int offset;  ///< first vertex in the island's numbering
     };
 
-    void begin(std::vector<ShellPart> shells, int vertexCount, std::vector<Mat6> mass, std::vector<Vec6> freeTwist);
+    /// `couplings`: off-diagonal blocks of the mass, between dynamic bodies by their index here.
+    void begin(std::vector<ShellPart> shells, int vertexCount, std::vector<Mat6> mass, std::vector<Vec6> freeTwist,
+               std::vector<BodyCoupling> couplings = {});
     /// Replaces all constraints and rows. At most one constraint per vertex.
     void setContacts(std::vector<VertexConstraint> constraints, std::vector<SoftRow> rows);
 
@@ -81,7 +84,11 @@ class CoupledSystem {
     int vertexCount() const { return m_vertexCount; }
     int bodyCount() const { return static_cast<int>(m_mass.size()); }
     const std::vector<Mat6>& mass() const { return m_mass; }
+    std::span<const BodyCoupling> couplings() const { return m_couplings; }
     const std::vector<Vec6>& freeTwist() const { return m_freeTwist; }
+    /// Momentum of the bodies that move with the twists w: M w.
+    void momentum(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w,
+                  Eigen::Matrix<double, 6, Eigen::Dynamic>& result) const;
 
     /// u with (I - S) s = z, and s, w such that free vertices move with v and bodies with w.
     void start(const Points& v, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, CoupledVector& u) const;
@@ -105,10 +112,12 @@ class CoupledSystem {
     int m_vertexCount = 0;
     std::vector<Mat6> m_mass;
     std::vector<Vec6> m_freeTwist;
+    std::vector<BodyCoupling> m_couplings;
     std::vector<VertexConstraint> m_constraints;
     std::vector<SoftRow> m_rows;
     std::vector<int> m_constraintOf;
     mutable Points m_v, m_q;
+    mutable Eigen::Matrix<double, 6, Eigen::Dynamic> m_w;
 };
 
 }  // namespace jacket
