@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "CoupledLinks.h"
 #include "ShellProxy.h"
 
 namespace jacket::bullet {
@@ -49,23 +50,31 @@ void IslandFinder::collectAnchors() {
             neighbour(*anchor.body).anchored.push_back(static_cast<int>(k));
 }
 
-/// For every shell the first shell of its island: shells are joined by the dynamic bodies that both have near.
-std::vector<int> IslandFinder::leaders(const std::vector<Obstacle>& obstacles) const {
+/// For every shell the first shell of its island: shells are joined by the dynamic bodies that both have near, and by
+/// bodies that are coupled.
+std::vector<int> IslandFinder::leaders(const std::vector<Obstacle>& obstacles,
+                                       const std::vector<BodyCoupling>& couplings) const {
     std::vector<int> leader(m_shells.size());
     std::iota(leader.begin(), leader.end(), 0);
     const auto find = [&](int k) {
         while (leader[k] != k) k = leader[k];
         return k;
     };
+    const auto shellsAt = [&](std::size_t b) {
+        std::vector<int> shells = m_neighbours[b].near;
+        shells.insert(shells.end(), m_neighbours[b].anchored.begin(), m_neighbours[b].anchored.end());
+        return shells;
+    };
+    const auto join = [&](int k, int with) {
+        const int a = find(k), c = find(with);
+        leader[std::max(a, c)] = std::min(a, c);
+    };
     for (std::size_t b = 0; b < obstacles.size(); ++b) {
         if (obstacles[b].body.prescribed) continue;
-        std::vector<int> joined = m_neighbours[b].near;
-        joined.insert(joined.end(), m_neighbours[b].anchored.begin(), m_neighbours[b].anchored.end());
-        for (const int k : joined) {
-            const int a = find(k), c = find(joined.front());
-            leader[std::max(a, c)] = std::min(a, c);
-        }
+        const std::vector<int> joined = shellsAt(b);
+        for (const int k : joined) join(k, joined.front());
     }
+    for (const auto& coupling : couplings) join(shellsAt(coupling.a).front(), shellsAt(coupling.b).front());
     for (std::size_t k = 0; k < leader.size(); ++k) leader[k] = find(static_cast<int>(k));
     return leader;
 }
@@ -74,7 +83,8 @@ std::vector<Island> IslandFinder::find(double h, bool hasMoved) {
     std::vector<Obstacle> obstacles;
     for (const Neighbour& n : m_neighbours)
         obstacles.push_back(m_obstacles.make(*n.object, h, *m_world.getDispatcher(), hasMoved));
-    const std::vector<int> leader = leaders(obstacles);
+    const std::vector<BodyCoupling> couplings = coupleLinks(obstacles, m_world, hasMoved ? 0.0 : h);
+    const std::vector<int> leader = leaders(obstacles, couplings);
 
     std::vector<Island> islands;
     std::vector<int> islandOf(m_shells.size()), indexInIsland(m_shells.size());
@@ -87,6 +97,7 @@ std::vector<Island> IslandFinder::find(double h, bool hasMoved) {
         indexInIsland[k] = static_cast<int>(islands[islandOf[k]].shells.size());
         islands[islandOf[k]].shells.push_back(m_shells[k]);
     }
+    std::vector<std::vector<int>> bodyIn(islands.size(), std::vector<int>(obstacles.size(), -1));
     for (std::size_t b = 0; b < obstacles.size(); ++b) {
         for (std::size_t i = 0; i < islands.size(); ++i) {
             Neighbour here{m_neighbours[b].object, {}, {}};
@@ -95,10 +106,14 @@ std::vector<Island> IslandFinder::find(double h, bool hasMoved) {
                          inIsland);
             std::copy_if(m_neighbours[b].anchored.begin(), m_neighbours[b].anchored.end(),
                          std::back_inserter(here.anchored), inIsland);
-            if (!here.near.empty() || !here.anchored.empty())
-                addObstacle(islands[i], obstacles[b], here, indexInIsland);
+            if (here.near.empty() && here.anchored.empty()) continue;
+            bodyIn[i][b] = static_cast<int>(islands[i].obstacles.size());
+            addObstacle(islands[i], obstacles[b], here, indexInIsland);
         }
     }
+    for (std::size_t i = 0; i < islands.size(); ++i)
+        for (const auto& c : couplings)
+            if (bodyIn[i][c.a] >= 0) islands[i].couplings.push_back({bodyIn[i][c.a], bodyIn[i][c.b], c.mass});
     return islands;
 }
 

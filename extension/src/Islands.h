@@ -8,12 +8,13 @@
 
 namespace jacket::bullet {
 
-/// Shells that share dynamic bodies, with the obstacles near them: one solve.
+/// Shells that share dynamic bodies or multibodies, with the obstacles near them: one solve.
 struct Island {
     std::vector<ShellBody*> shells;
     std::vector<Obstacle> obstacles;
     std::vector<std::pair<int, int>> pairs;  ///< (shell, obstacle) that Bullet's broadphase finds near each other
     std::vector<Anchor> anchors;
+    std::vector<BodyCoupling> couplings;  ///< between obstacles
 };
 
 /// Sorts shells into islands. Everything is ordered by the objects' place in the world, so that a run can be repeated.
@@ -33,7 +34,7 @@ class IslandFinder {
     void collectPairs();
     void notePair(const btCollisionObject* proxy, btCollisionObject* object);
     void collectAnchors();
-    std::vector<int> leaders(const std::vector<Obstacle>& obstacles) const;
+    std::vector<int> leaders(const std::vector<Obstacle>& obstacles, const std::vector<BodyCoupling>& couplings) const;
     void addObstacle(Island& island, const Obstacle& obstacle, const Neighbour& neighbour,
                      const std::vector<int>& indexInIsland) const;
 

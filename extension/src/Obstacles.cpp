@@ -2,11 +2,13 @@
 
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 
 #include <Eigen/LU>
 #include <algorithm>
 
 #include "ConvexPieces.h"
+#include "CoupledLinks.h"
 #include "jacket/Types.h"
 
 namespace jacket::bullet {
@@ -101,7 +103,11 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, btDispatcher& disp
     for (const auto& piece : obstacle.shape->pieces)
         coupled.inner = std::min(coupled.inner, 0.5 * (piece->upper() - piece->lower()).minCoeff());
     const btRigidBody* rigid = btRigidBody::upcast(&object);
-    if (!rigid || object.isStaticObject()) {
+    if (const auto* link = btMultiBodyLinkCollider::upcast(&object)) {
+        coupled.freeTwist = twistOf(*link);
+        coupled.prescribed = isPrescribed(*link);
+        if (hasMoved) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
+    } else if (!rigid || object.isStaticObject()) {
         coupled.prescribed = true;
     } else {
         const bool moves = !object.isKinematicObject() && rigid->isActive() && rigid->getInvMass() != btScalar(0);

@@ -34,7 +34,8 @@ struct Obstacle {
 class Obstacles {
   public:
     /// Static, kinematic and sleeping bodies become bodies of prescribed motion. With `hasMoved` every body starts
-    /// where it stood h ago, with the velocity that it has: the motion that Bullet has already made.
+    /// where it stood h ago, with the velocity that it has: the motion that Bullet has already made. Links that are not
+    /// prescribed get their mass from coupleLinks.
     Obstacle make(btCollisionObject& object, double h, btDispatcher& dispatcher, bool hasMoved);
     /// Shapes without any piece that shells can touch are reported here once, by Bullet's name of the shape.
     std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }

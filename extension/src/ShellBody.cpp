@@ -1,6 +1,7 @@
 #include "jacket/bullet/ShellBody.h"
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 
 #include <stdexcept>
 #include <string>
@@ -96,6 +97,13 @@ StaticReport ShellBody::settle(const btVector3& gravity, const StaticSettings& s
 }
 
 void ShellBody::anchor(int vertex, btRigidBody& body) {
+    anchorTo(vertex, body);
+}
+void ShellBody::anchor(int vertex, btMultiBodyLinkCollider& link) {
+    anchorTo(vertex, link);
+}
+
+void ShellBody::anchorTo(int vertex, btCollisionObject& body) {
     if (vertex < 0 || vertex >= vertexCount())
         throw std::out_of_range("ShellBody::anchor: vertex must be 0.." + std::to_string(vertexCount() - 1) + ", got " +
                                 std::to_string(vertex));

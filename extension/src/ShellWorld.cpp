@@ -3,6 +3,7 @@
 #include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 #include <LinearMath/btIDebugDraw.h>
 
 #include <algorithm>
@@ -12,8 +13,10 @@
 #include <stdexcept>
 #include <unordered_map>
 
+#include "ArticulatedBody.h"
 #include "Convert.h"
 #include "FastBodies.h"
+#include "CoupledLinks.h"
 #include "Islands.h"
 #include "ShellContacts.h"
 #include "ShellProxy.h"
@@ -38,14 +41,19 @@ bool contains(const btCollisionWorld& world, const btCollisionObject* object) {
     return false;
 }
 
+/// Speed of a collision object's centre of mass [m/s].
+double speedOf(const btCollisionObject& object) {
+    if (const auto* body = btRigidBody::upcast(&object)) return double(body->getLinearVelocity().length());
+    if (const auto* link = btMultiBodyLinkCollider::upcast(&object)) return twistOf(*link).head<3>().norm();
+    return 0.0;
+}
+
 /// Fastest that any point of any moving object goes, roughly: how far bounds must reach ahead [m/s].
 double fastestObject(const btCollisionWorld& world) {
     double speed = 0.0;
     const auto& objects = world.getCollisionObjectArray();
     for (int i = 0; i < objects.size(); ++i) {
-        const btRigidBody* body = btRigidBody::upcast(objects[i]);
-        if (!body || body->isStaticObject() || !body->isActive()) continue;
-        speed = std::max(speed, double(body->getLinearVelocity().length()));
+        if (!objects[i]->isStaticObject() && objects[i]->isActive()) speed = std::max(speed, speedOf(*objects[i]));
     }
     return speed;
 }
@@ -196,6 +204,7 @@ void ShellWorld::solveIsland(Island& island, double h) {
     input.wind = m_impl->hasWind ? &m_impl->wind : nullptr;
     input.shells = shells;
     input.bodies = coupled;
+    input.couplings = island.couplings;
     input.anchors = island.anchors;
     input.contacts = island.pairs.empty() ? nullptr : &contacts;
     const auto start = std::chrono::steady_clock::now();
@@ -247,13 +256,19 @@ void ShellWorld::carry(const ShellBody& shell, int vertex, const Island& island,
 }
 
 void ShellWorld::react(btCollisionObject& object, const CoupledBody& coupled) {
+    if (object.isStaticOrKinematicObject() || coupled.impulse.isZero(0.0)) return;
+    const double still = 0.02 * double(m_world.getGravity().length()) / 60.0;
+    if (auto* link = btMultiBodyLinkCollider::upcast(&object)) {
+        pushLink(*link, coupled.impulse, still);
+        return;
+    }
     btRigidBody* body = btRigidBody::upcast(&object);
-    if (!body || body->isStaticOrKinematicObject() || coupled.impulse.isZero(0.0)) return;
+    if (!body) return;
     const Vec3 impulse = coupled.impulse.head<3>();
     Push& last = m_impl->pushes[&object];
     if (!body->isActive()) {  // a feather does not wake a sleeping crate, nor does what it fell asleep under
         const double kick = double(body->getInvMass()) * (impulse - last.impulse).norm();
-        if (kick > 0.02 * double(m_world.getGravity().length()) / 60.0) body->activate();
+        if (kick > still) body->activate();
     }
     foretellLoad(*m_world.getDispatcher(), object, impulse - last.impulse);
     last = {impulse, true};

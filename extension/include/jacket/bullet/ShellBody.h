@@ -10,6 +10,8 @@
 #include "jacket/Shell.h"
 #include "jacket/Statics.h"
 
+class btCollisionObject;
+class btMultiBodyLinkCollider;
 class btRigidBody;
 
 namespace jacket::bullet {
@@ -72,6 +74,7 @@ class ShellBody {
     StaticReport settle(const btVector3& gravity, const StaticSettings& settings = {});
     /// Ties a vertex to a body at their present distance. The body may be removed at any time, which frees the vertex.
     void anchor(int vertex, btRigidBody& body);
+    void anchor(int vertex, btMultiBodyLinkCollider& link);
 
     /// Asleep it stands still and costs nothing until something happens to it, or activate() is called.
     bool isAsleep() const;
@@ -99,7 +102,7 @@ class ShellBody {
     ShellBody(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options);
     struct Anchor {
         int vertex;
-        btRigidBody* body;
+        btCollisionObject* body;
         btVector3 local;  ///< in the body's frame
     };
     Shell m_shell;
@@ -111,6 +114,7 @@ class ShellBody {
     std::vector<btVector3> m_positions;
     mutable std::vector<btVector3> m_normals;
     void publish();  ///< copies positions for drawing
+    void anchorTo(int vertex, btCollisionObject& body);
     void fallAsleep();
     BodyContact describe(const ContactImpulse& impulse, btCollisionObject& object) const;
     std::unique_ptr<ShellRest> m_rest;
