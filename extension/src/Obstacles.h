@@ -39,12 +39,15 @@ class Obstacles {
     Obstacle make(btCollisionObject& object, double h, btDispatcher& dispatcher, bool hasMoved);
     /// Shapes without any piece that shells can touch are reported here once, by Bullet's name of the shape.
     std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }
+    /// Whether the world adds gravity to velocities itself instead of leaving it in the bodies' total force.
+    void setGravityIsNoForce(bool value) { m_gravityIsNoForce = value; }
 
   private:
     const ShapePieces& piecesOf(const btCollisionShape& shape);
     std::unordered_map<const btCollisionShape*, ShapePieces> m_shapes;
     std::vector<std::string> m_warnings;
     std::vector<std::string> m_warnedNames;
+    bool m_gravityIsNoForce = false;
 };
 
 /// Pose after moving with a twist for a time: rotation by the exponential of the angular velocity.

@@ -87,6 +87,9 @@ struct ShellWorld::Impl {
 };
 
 ShellWorld::ShellWorld(btDynamicsWorld& world) : m_world(world), m_impl(std::make_unique<Impl>()) {
+    if (m_world.getWorldType() == BT_SIMPLE_DYNAMICS_WORLD)
+        throw std::invalid_argument("ShellWorld: a btSimpleDynamicsWorld runs no actions, so shells would never move");
+    m_impl->obstacles.setGravityIsNoForce(m_world.getWorldType() == BT_DEFORMABLE_MULTIBODY_DYNAMICS_WORLD);
     m_world.addAction(this);
 }
 

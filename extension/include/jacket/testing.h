@@ -77,7 +77,7 @@ struct Scene : WorldParts<World> {
         std::erase_if(bodies, [&](const auto& b) { return b.get() == &body; });
     }
     /// One step of exactly h.
-    void step(double h) { world.stepSimulation(btScalar(h), 0); }
+    void step(double h) { world.stepSimulation(btScalar(h), 0, btScalar(h)); }
     void run(double seconds, double h) {
         for (int i = 0; i < int(seconds / h + 0.5); ++i) step(h);
     }

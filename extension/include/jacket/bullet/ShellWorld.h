@@ -31,6 +31,7 @@ struct WorldReport {
 /// before the world. Steps with world.stepSimulation; nothing else changes.
 class ShellWorld : public btActionInterface {
   public:
+    /// Throws std::invalid_argument for a btSimpleDynamicsWorld, which runs no actions.
     explicit ShellWorld(btDynamicsWorld& world);
     ~ShellWorld() override;
     ShellWorld(const ShellWorld&) = delete;
