@@ -40,14 +40,15 @@ void IslandFinder::notePair(const btCollisionObject* proxy, btCollisionObject* o
     if (proxy->getInternalType() != btCollisionObject::CO_USER_TYPE) return;
     if (!object->hasContactResponse()) return;  // a trigger, or another shell
     for (std::size_t k = 0; k < m_shells.size(); ++k)
-        if (m_shells[k]->m_proxy.get() == proxy && m_shells[k]->m_proxy->mayTouch(*object))
+        if (m_shells[k]->m_proxy.get() == proxy && m_shells[k]->m_proxy->mayTouch(*object) &&
+            m_obstacles.isUsable(*object))
             neighbour(*object).near.push_back(static_cast<int>(k));
 }
 
 void IslandFinder::collectAnchors() {
     for (std::size_t k = 0; k < m_shells.size(); ++k)
         for (const auto& anchor : m_shells[k]->m_anchors)
-            neighbour(*anchor.body).anchored.push_back(static_cast<int>(k));
+            if (m_obstacles.isUsable(*anchor.body)) neighbour(*anchor.body).anchored.push_back(static_cast<int>(k));
 }
 
 /// For every shell the first shell of its island: shells are joined by the dynamic bodies that both have near, and by

@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "Checks.h"
 #include "ConvexPieces.h"
 #include "CoupledLinks.h"
 #include "jacket/Types.h"
@@ -121,6 +122,17 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, btDispatcher& disp
     }
     coupled.position = obstacle.start.translation();
     return obstacle;
+}
+
+bool Obstacles::isUsable(const btCollisionObject& object) {
+    const char* defect = defectOf(object);
+    if (!defect) return true;
+    if (std::find(m_warnedBodies.begin(), m_warnedBodies.end(), &object) == m_warnedBodies.end()) {
+        m_warnedBodies.push_back(&object);
+        m_warnings.push_back("shells ignore body " + std::to_string(object.getWorldArrayIndex()) + " (" +
+                             object.getCollisionShape()->getName() + ") while its " + defect);
+    }
+    return false;
 }
 
 const ShapePieces& Obstacles::piecesOf(const btCollisionShape& shape) {

@@ -39,6 +39,8 @@ class Obstacles {
     Obstacle make(btCollisionObject& object, double h, btDispatcher& dispatcher, bool hasMoved);
     /// Shapes without any piece that shells can touch are reported here once, by Bullet's name of the shape.
     std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }
+    /// False for bodies that no solve could take, see defectOf; warns once of each.
+    bool isUsable(const btCollisionObject& object);
     /// Whether the world adds gravity to velocities itself instead of leaving it in the bodies' total force.
     void setGravityIsNoForce(bool value) { m_gravityIsNoForce = value; }
 
@@ -47,6 +49,7 @@ class Obstacles {
     std::unordered_map<const btCollisionShape*, ShapePieces> m_shapes;
     std::vector<std::string> m_warnings;
     std::vector<std::string> m_warnedNames;
+    std::vector<const btCollisionObject*> m_warnedBodies;
     bool m_gravityIsNoForce = false;
 };
 

@@ -14,6 +14,7 @@
 #include <unordered_map>
 
 #include "ArticulatedBody.h"
+#include "Checks.h"
 #include "Convert.h"
 #include "FastBodies.h"
 #include "CoupledLinks.h"
@@ -34,11 +35,13 @@ double secondsSince(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-bool contains(const btCollisionWorld& world, const btCollisionObject* object) {
+/// The broadphase's id of an object of this world, -1 if it is not there. An object that is allocated where a removed
+/// one was has another id (with btDbvtBroadphase; broadphases that count slots may give the same again).
+int idOf(const btCollisionWorld& world, const btCollisionObject* object) {
     const auto& objects = world.getCollisionObjectArray();
     for (int i = 0; i < objects.size(); ++i)
-        if (objects[i] == object) return true;
-    return false;
+        if (objects[i] == object) return object->getBroadphaseHandle()->getUid();
+    return -1;
 }
 
 /// Speed of a collision object's centre of mass [m/s].
@@ -65,6 +68,7 @@ double fastestObject(const btCollisionWorld& world) {
 struct CarriedVertex {
     int shell, vertex;
     const btCollisionObject* object;
+    int objectId;
     Frame start;
     Vec6 twist;
     std::optional<Vec3> anchor;  ///< where the vertex is tied, in the body's frame
@@ -82,8 +86,10 @@ struct ShellWorld::Impl {
     std::vector<CarriedVertex> carried;
     FastBodies::Solved solved;
     std::unordered_map<const btCollisionObject*, Push> pushes;
+    ShellChecks checks;
     Wind wind;
     bool hasWind = false, windChanged = false;
+    btVector3 gravity{0, 0, 0};  ///< of the last solve
 };
 
 ShellWorld::ShellWorld(btDynamicsWorld& world) : m_world(world), m_impl(std::make_unique<Impl>()) {
@@ -111,12 +117,14 @@ ShellBody& ShellWorld::add(const TriangleMesh& mesh, const ShellMaterial& materi
 void ShellWorld::remove(ShellBody& shell) {
     const auto found = std::find_if(m_shells.begin(), m_shells.end(), [&](const auto& s) { return s.get() == &shell; });
     if (found == m_shells.end()) throw std::invalid_argument("ShellWorld::remove: the shell is not in this world");
-    m_world.removeCollisionObject(shell.m_proxy.get());
     Sleepers(m_world, m_impl->obstacles, m_shells).wakeUp(shell);  // and what lay on it
-    m_impl->solvers.clear();                                       // they remember contacts by shell
-    m_impl->carried.clear();
+    const std::unique_ptr<ShellBody> removed = std::move(*found);
     m_shells.erase(found);
+    m_impl->solvers.clear();  // they remember contacts by shell
+    m_impl->carried.clear();
+    m_impl->checks.forget(*removed);
     m_report.shells = size();
+    m_world.removeCollisionObject(removed->m_proxy.get());
 }
 
 void ShellWorld::setWind(const Wind& wind) {
@@ -130,7 +138,9 @@ void ShellWorld::clearWind() {
 }
 
 std::vector<std::string> ShellWorld::takeWarnings() {
-    return m_impl->obstacles.takeWarnings();
+    std::vector<std::string> warnings = m_impl->obstacles.takeWarnings();
+    for (std::string& warning : m_impl->checks.takeWarnings()) warnings.push_back(std::move(warning));
+    return warnings;
 }
 
 /// Bullet has just moved the bodies by the velocities that the last solve, and its own contacts, gave them. Here the
@@ -144,7 +154,8 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     report.unconvergedSteps = m_report.unconvergedSteps;
     report.passedSteps = m_report.passedSteps;
     m_report = report;
-    const Vec3 gravity = fromBullet(m_world.getGravity());
+    releaseAnchors(*world);
+    followGravity(double(h));
     std::vector<ShellBody*> all;
     for (const auto& shell : m_shells) all.push_back(shell.get());
     solveNewcomers(*world, double(h));
@@ -152,16 +163,43 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     moveShells(*world, double(h));
     fast.holdBack();
     m_impl->solved.clear();
+    const Vec3 gravity = fromBullet(m_impl->gravity);
     Sleepers sleepers(*world, m_impl->obstacles, m_shells);
     sleepers.wake(gravity, double(h), std::exchange(m_impl->windChanged, false));
     std::erase_if(all, [](const ShellBody* shell) { return shell->isAsleep(); });
     m_report.awake = static_cast<int>(all.size());
     if (!all.empty())
-        for (Island& island : IslandFinder(*world, m_impl->obstacles, all).find(double(h), false))
+        for (Island& island : IslandFinder(*world, m_impl->obstacles, all).find(double(h), false)) {
+            m_impl->checks.look(island);
             solveIsland(island, double(h));
+        }
     forgetPushes(*world);
     sleepers.rest(gravity, double(h));
     updateAllBounds(double(h));
+}
+
+/// Gravity has changed since velocities were solved for: Bullet's bodies have just fallen with the new one.
+void ShellWorld::followGravity(double h) {
+    const btVector3 before = std::exchange(m_impl->gravity, m_world.getGravity());
+    if (before == m_impl->gravity) return;
+    for (const auto& body : m_shells) {
+        if (!body->m_hasVelocity || body->isAsleep()) continue;
+        Shell& shell = body->m_shell;
+        const Vec3 change = h * fromBullet(m_impl->gravity) - body->m_pendingGravity;
+        Points v = shell.velocities();
+        for (int i = 0; i < shell.vertexCount(); ++i) v.col(i) += shell.freedom(i) * change;
+        shell.setVelocities(v);
+    }
+}
+
+/// A removed body lets go.
+void ShellWorld::releaseAnchors(btCollisionWorld& world) {
+    for (const auto& shell : m_shells)
+        std::erase_if(shell->m_anchors, [&](auto& anchor) {
+            const int id = idOf(world, anchor.body);
+            if (anchor.bodyId < 0) anchor.bodyId = id;
+            return id < 0 || id != anchor.bodyId;
+        });
 }
 
 /// Shells that were added, or given a velocity, since the last step have no solved velocity to move with: they get one
@@ -178,7 +216,7 @@ void ShellWorld::moveShells(btCollisionWorld& world, double h) {
     for (const auto& shell : m_shells)
         if (shell->m_hasVelocity && !shell->isAsleep()) shell->m_shell.advance(h);
     for (const CarriedVertex& c : m_impl->carried) {
-        if (!contains(world, c.object)) continue;
+        if (idOf(world, c.object) != c.objectId) continue;
         Shell& shell = m_shells[c.shell]->m_shell;
         const Vec3 assumed = shell.positions().col(c.vertex);
         const Vec3 local = c.anchor ? *c.anchor : moved(c.start, c.twist, h).inverse(Eigen::Isometry) * assumed;
@@ -186,11 +224,8 @@ void ShellWorld::moveShells(btCollisionWorld& world, double h) {
         if (by.norm() < kTeleport * h && by.allFinite()) shell.displace(c.vertex, by);
     }
     m_impl->carried.clear();
-    for (const auto& shell : m_shells) {
-        auto& anchors = shell->m_anchors;  // a removed body lets go
-        std::erase_if(anchors, [&](const auto& a) { return !contains(world, a.body); });
+    for (const auto& shell : m_shells)
         if (!shell->isAsleep()) shell->publish();
-    }
 }
 
 void ShellWorld::solveIsland(Island& island, double h) {
@@ -255,8 +290,9 @@ void ShellWorld::carry(const ShellBody& shell, int vertex, const Island& island,
     std::optional<Vec3> local;
     if (anchor) local = obstacle.start.inverse(Eigen::Isometry) * *anchor;
     const auto index = std::find_if(m_shells.begin(), m_shells.end(), [&](const auto& s) { return s.get() == &shell; });
-    m_impl->carried.push_back({static_cast<int>(index - m_shells.begin()), vertex, obstacle.object, obstacle.start,
-                               coupled[body].twist, local});
+    m_impl->carried.push_back({static_cast<int>(index - m_shells.begin()), vertex, obstacle.object,
+                               obstacle.object->getBroadphaseHandle()->getUid(), obstacle.start, coupled[body].twist,
+                               local});
 }
 
 void ShellWorld::react(btCollisionObject& object, const CoupledBody& coupled) {
@@ -285,7 +321,7 @@ void ShellWorld::react(btCollisionObject& object, const CoupledBody& coupled) {
 void ShellWorld::forgetPushes(const btCollisionWorld& world) {
     for (auto it = m_impl->pushes.begin(); it != m_impl->pushes.end();) {
         auto& [object, push] = *it;
-        const bool isHere = contains(world, object);
+        const bool isHere = idOf(world, object) >= 0;
         if (isHere && (std::exchange(push.isNew, false) || !object->isActive())) {
             ++it;
             continue;

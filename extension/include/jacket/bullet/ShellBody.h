@@ -72,7 +72,8 @@ class ShellBody {
     /// Moves the shell to its equilibrium under gravity, its forces and pressure, as held, without bodies: see
     /// jacket/Statics.h.
     StaticReport settle(const btVector3& gravity, const StaticSettings& settings = {});
-    /// Ties a vertex to a body at their present distance. The body may be removed at any time, which frees the vertex.
+    /// Ties a vertex to a body at their present distance. The body may be removed at any time, which frees the vertex
+    /// (also if the body is added again: a new entry of the broadphase is a new body).
     void anchor(int vertex, btRigidBody& body);
     void anchor(int vertex, btMultiBodyLinkCollider& link);
 
@@ -104,6 +105,7 @@ class ShellBody {
         int vertex;
         btCollisionObject* body;
         btVector3 local;  ///< in the body's frame
+        int bodyId = -1;  ///< the broadphase's; -1: not asked for yet
     };
     Shell m_shell;
     ShellOptions m_options;

@@ -56,6 +56,8 @@ class ShellWorld : public btActionInterface {
 
   private:
     struct Impl;
+    void releaseAnchors(btCollisionWorld& world);
+    void followGravity(double h);
     void solveNewcomers(btCollisionWorld& world, double h);
     void moveShells(btCollisionWorld& world, double h);
     void solveIsland(Island& island, double h);

@@ -1,0 +1,86 @@
+#include "Checks.h"
+
+#include <BulletCollision/CollisionShapes/btCollisionShape.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <cmath>
+#include <iomanip>
+#include <sstream>
+
+#include "Islands.h"
+
+namespace jacket::bullet {
+namespace {
+
+bool isFinite(const btVector3& v) {
+    return std::isfinite(v.x()) && std::isfinite(v.y()) && std::isfinite(v.z());
+}
+
+bool isFinite(const btMatrix3x3& m) {
+    return isFinite(m[0]) && isFinite(m[1]) && isFinite(m[2]);
+}
+
+std::string millimetres(double length) {
+    std::ostringstream text;
+    text << std::setprecision(3) << 1e3 * length << " mm";
+    return text.str();
+}
+
+std::string nameOf(const ShellBody& shell) {
+    return shell.name().empty() ? "a shell without a name" : "shell \"" + shell.name() + "\"";
+}
+
+double meanEdge(const Shell& shell) {
+    double sum = 0.0;
+    for (const auto& e : shell.mesh().edges())
+        sum += (shell.restPositions().col(e.v0) - shell.restPositions().col(e.v1)).norm();
+    return sum / static_cast<double>(shell.mesh().edges().size());
+}
+
+/// Spheres, capsules and the like are all margin.
+bool hasCorners(const btCollisionShape& shape) {
+    const int type = shape.getShapeType();
+    return shape.isPolyhedral() || type == CYLINDER_SHAPE_PROXYTYPE || type == CONE_SHAPE_PROXYTYPE;
+}
+
+}  // namespace
+
+const char* defectOf(const btCollisionObject& object) {
+    const btTransform& pose = object.getWorldTransform();
+    if (!isFinite(pose.getOrigin()) || !isFinite(pose.getBasis())) return "position is not finite";
+    const btRigidBody* body = btRigidBody::upcast(&object);
+    if (!body) return nullptr;
+    if (!isFinite(body->getLinearVelocity()) || !isFinite(body->getAngularVelocity())) return "velocity is not finite";
+    if (!isFinite(body->getTotalForce()) || !isFinite(body->getTotalTorque())) return "force is not finite";
+    const btVector3& inertia = body->getInvInertiaDiagLocal();
+    if (!std::isfinite(body->getInvMass()) || body->getInvMass() < btScalar(0) || !isFinite(inertia) ||
+        !isFinite(body->getInvInertiaTensorWorld()) || inertia[inertia.minAxis()] < btScalar(0))
+        return "mass or inertia is negative or not finite";
+    return nullptr;
+}
+
+ShellChecks::Known& ShellChecks::known(const ShellBody& shell) {
+    const auto [entry, fresh] = m_known.try_emplace(&shell);
+    if (!fresh) return entry->second;
+    const Points& rest = shell.shell().restPositions();
+    entry->second.size = (rest.rowwise().maxCoeff() - rest.rowwise().minCoeff()).norm();
+    if (const double edge = meanEdge(shell.shell()); shell.contactThickness() > edge)
+        m_warnings.push_back(nameOf(shell) + ": contact thickness " + millimetres(shell.contactThickness()) +
+                             " is larger than the edges (" + millimetres(edge) + " on average)");
+    return entry->second;
+}
+
+void ShellChecks::look(const Island& island) {
+    for (const ShellBody* shell : island.shells) known(*shell);
+    for (const auto& [index, body] : island.pairs) {
+        const btCollisionShape& shape = *island.obstacles[body].object->getCollisionShape();
+        const ShellBody& shell = *island.shells[index];
+        Known& about = known(shell);
+        if (about.warnedOfMargin || !hasCorners(shape) || !(double(shape.getMargin()) > about.size)) continue;
+        about.warnedOfMargin = true;
+        m_warnings.push_back(nameOf(shell) + " of " + millimetres(about.size) + " is smaller than the margin " +
+                             millimetres(double(shape.getMargin())) + " of a " + shape.getName() + " near it");
+    }
+}
+
+}  // namespace jacket::bullet

@@ -1,0 +1,35 @@
+#pragma once
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "jacket/bullet/ShellBody.h"
+
+class btCollisionObject;
+
+namespace jacket::bullet {
+
+struct Island;
+
+/// What makes a body unusable for a solve, e.g. "position is not finite"; null: nothing.
+const char* defectOf(const btCollisionObject& object);
+
+/// Sizes that hardly are what the user wants, told once per shell and by its name.
+class ShellChecks {
+  public:
+    void look(const Island& island);
+    void forget(const ShellBody& shell) { m_known.erase(&shell); }
+    std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }
+
+  private:
+    struct Known {
+        double size = 0.0;  ///< diagonal of the bounds at rest [m]
+        bool warnedOfMargin = false;
+    };
+    Known& known(const ShellBody& shell);
+    std::map<const ShellBody*, Known> m_known;
+    std::vector<std::string> m_warnings;
+};
+
+}  // namespace jacket::bullet
