@@ -60,6 +60,13 @@ ShellBody::ShellBody(const TriangleMesh& mesh, const ShellMaterial& material, co
 
 ShellBody::~ShellBody() = default;
 
+btCollisionObject& ShellBody::collisionObject() {
+    return *m_proxy;
+}
+const btCollisionObject& ShellBody::collisionObject() const {
+    return *m_proxy;
+}
+
 void ShellBody::publish() {
     for (int i = 0; i < vertexCount(); ++i) m_positions[i] = toBullet(Vec3(m_shell.positions().col(i)));
 }
@@ -143,6 +150,7 @@ void ShellBody::setPositions(std::span<const btVector3> positions) {
     Points x(3, positions.size());
     for (std::size_t i = 0; i < positions.size(); ++i) x.col(i) = fromBullet(positions[i]);
     m_shell.setPositions(x);
+    m_proxy->shape().setBounds(toBullet(Vec3(x.rowwise().minCoeff())), toBullet(Vec3(x.rowwise().maxCoeff())));
     publish();
 }
 

@@ -8,9 +8,10 @@ ShellShape::ShellShape(const ShellBody& body) : m_body(body) {
     m_shapeType = FAST_CONCAVE_MESH_PROXYTYPE;
 }
 
-void ShellShape::setBounds(const btVector3& lower, const btVector3& upper) {
-    m_lower = lower;
-    m_upper = upper;
+void ShellShape::setBounds(const btVector3& lower, const btVector3& upper, btScalar ahead) {
+    m_ahead = ahead;
+    m_lower = lower - btVector3(ahead, ahead, ahead);
+    m_upper = upper + btVector3(ahead, ahead, ahead);
 }
 
 void ShellShape::getAabb(const btTransform&, btVector3& lower, btVector3& upper) const {
@@ -32,7 +33,7 @@ void ShellShape::processAllTriangles(btTriangleCallback* callback, const btVecto
 
 ShellBody::Proxy::Proxy(ShellBody& body) : m_body(body), m_shape(body) {
     m_internalType = CO_USER_TYPE;
-    m_checkCollideWith = 1;
+    keepHidden();
     setCollisionShape(&m_shape);
     setCollisionFlags(CF_NO_CONTACT_RESPONSE);
     setActivationState(DISABLE_DEACTIVATION);

@@ -12,7 +12,9 @@ namespace jacket::bullet {
 class ShellShape final : public btConcaveShape {
   public:
     explicit ShellShape(const ShellBody& body);
-    void setBounds(const btVector3& lower, const btVector3& upper);
+    /// Of the vertices; the coming motion reaches `ahead` beyond them (unless given: as far as before) [m].
+    void setBounds(const btVector3& lower, const btVector3& upper) { setBounds(lower, upper, m_ahead); }
+    void setBounds(const btVector3& lower, const btVector3& upper, btScalar ahead);
     void getAabb(const btTransform&, btVector3& lower, btVector3& upper) const override;
     void processAllTriangles(btTriangleCallback* callback, const btVector3& lower,
                              const btVector3& upper) const override;
@@ -24,6 +26,7 @@ class ShellShape final : public btConcaveShape {
   private:
     const ShellBody& m_body;
     btVector3 m_lower{0, 0, 0}, m_upper{0, 0, 0}, m_scaling{1, 1, 1};
+    btScalar m_ahead = 0;
 };
 
 /// The collision object of a shell: in the broadphase, visible to ray and sweep tests, never given a contact by Bullet.
@@ -32,6 +35,8 @@ class ShellBody::Proxy final : public btCollisionObject {
     explicit Proxy(ShellBody& body);
     /// False for the dispatcher, which would otherwise build manifolds that nobody reads.
     bool checkCollideWithOverride(const btCollisionObject*) const override { return false; }
+    /// Bullet stops to ask the above when the user empties the list of pairs to ignore.
+    void keepHidden() { m_checkCollideWith = 1; }
     /// The user's own list of pairs to ignore (btCollisionObject::setIgnoreCollisionCheck), from either side.
     bool mayTouch(const btCollisionObject& other) const;
     ShellShape& shape() { return m_shape; }

@@ -127,6 +127,12 @@ void ShellWorld::remove(ShellBody& shell) {
     m_world.removeCollisionObject(removed->m_proxy.get());
 }
 
+ShellBody* ShellWorld::find(const btCollisionObject& object) {
+    const auto found =
+        std::find_if(m_shells.begin(), m_shells.end(), [&](const auto& s) { return s->m_proxy.get() == &object; });
+    return found == m_shells.end() ? nullptr : found->get();
+}
+
 void ShellWorld::setWind(const Wind& wind) {
     m_impl->wind = wind;
     m_impl->hasWind = m_impl->windChanged = true;
@@ -341,12 +347,11 @@ void ShellWorld::updateAllBounds(double h) {
 void ShellWorld::updateBounds(ShellBody& shell, double fastest, double h) {
     const Points& x = shell.m_shell.positions();
     const Points& v = shell.m_shell.velocities();
-    Vec3 lower = x.rowwise().minCoeff(), upper = x.rowwise().maxCoeff();
+    const Vec3 lower = x.rowwise().minCoeff(), upper = x.rowwise().maxCoeff();
     const double ahead = 2.0 * h * (fastest + v.colwise().norm().maxCoeff()) +
                          4.0 * h * h * double(m_world.getGravity().length()) + shell.contactThickness() + 1e-3;
-    lower.array() -= ahead;
-    upper.array() += ahead;
-    shell.m_proxy->shape().setBounds(toBullet(lower), toBullet(upper));
+    shell.m_proxy->keepHidden();
+    shell.m_proxy->shape().setBounds(toBullet(lower), toBullet(upper), btScalar(ahead));
     shell.m_rest->boundsSpeed = fastest;
 }
 

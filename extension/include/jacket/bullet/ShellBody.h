@@ -81,10 +81,15 @@ class ShellBody {
     bool isAsleep() const;
     void activate();
 
+    /// Bullet's queries find the shell there after the world's next step or updateAabbs().
     void setPositions(std::span<const btVector3> positions);
     void setVelocity(const btVector3& velocity);  ///< of every vertex
     void setName(std::string name) { m_name = std::move(name); }
     const std::string& name() const { return m_name; }
+    /// How Bullet sees the shell: for its queries and for setIgnoreCollisionCheck. Has contact response off, and a
+    /// shape and transform of its own that are not to be changed.
+    btCollisionObject& collisionObject();
+    const btCollisionObject& collisionObject() const;
 
     Shell& shell() { return m_shell; }  ///< the solver's own, in double precision
     const Shell& shell() const { return m_shell; }

@@ -41,6 +41,8 @@ class ShellWorld : public btActionInterface {
     /// remove().
     ShellBody& add(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options = {});
     void remove(ShellBody& shell);
+    /// The shell behind a hit of Bullet's queries or a body of a manifold, or null.
+    ShellBody* find(const btCollisionObject& object);
     int size() const { return static_cast<int>(m_shells.size()); }
     ShellBody& operator[](int i) { return *m_shells[i]; }
     const ShellBody& operator[](int i) const { return *m_shells[i]; }
