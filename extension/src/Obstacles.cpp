@@ -63,7 +63,9 @@ void addSupports(btDispatcher& dispatcher, const btRigidBody& body, CoupledBody&
         const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(m);
         const bool first = manifold.getBody0() == &body;
         if (!first && manifold.getBody1() != &body) continue;
-        const auto* other = btRigidBody::upcast(first ? manifold.getBody1() : manifold.getBody0());
+        const btCollisionObject* otherObject = first ? manifold.getBody1() : manifold.getBody0();
+        if (!otherObject->hasContactResponse()) continue;  // a shell, shown to the user: see ContactManifolds
+        const auto* other = btRigidBody::upcast(otherObject);
         const double mass = coupled.mass.diagonal().head<3>().minCoeff();
         const double weight =
             other && other->getInvMass() > 0 && other->isActive() ? 1.0 / double(other->getInvMass()) : kSupport * mass;

@@ -15,6 +15,7 @@
 
 #include "ArticulatedBody.h"
 #include "Checks.h"
+#include "ContactManifolds.h"
 #include "Convert.h"
 #include "FastBodies.h"
 #include "CoupledLinks.h"
@@ -86,6 +87,7 @@ struct ShellWorld::Impl {
     std::vector<CarriedVertex> carried;
     FastBodies::Solved solved;
     std::unordered_map<const btCollisionObject*, Push> pushes;
+    ContactManifolds manifolds;
     ShellChecks checks;
     Wind wind;
     bool hasWind = false, windChanged = false;
@@ -124,7 +126,7 @@ void ShellWorld::remove(ShellBody& shell) {
     m_impl->carried.clear();
     m_impl->checks.forget(*removed);
     m_report.shells = size();
-    m_world.removeCollisionObject(removed->m_proxy.get());
+    m_world.removeCollisionObject(removed->m_proxy.get());  // last: ends contacts, of which the user's callbacks hear
 }
 
 ShellBody* ShellWorld::find(const btCollisionObject& object) {
@@ -182,6 +184,7 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     forgetPushes(*world);
     sleepers.rest(gravity, double(h));
     updateAllBounds(double(h));
+    m_impl->manifolds.update(*world, m_shells);
 }
 
 /// Gravity has changed since velocities were solved for: Bullet's bodies have just fallen with the new one.

@@ -29,6 +29,11 @@ struct WorldReport {
 
 /// The shells of one Bullet world. Registers itself as an action of the world and leaves it when destroyed; destroy it
 /// before the world. Steps with world.stepSimulation; nothing else changes.
+///
+/// Contacts of shells are among the dispatcher's manifolds, with the shell's collision object as body 0 and the
+/// triangle in m_index0: up to four per body, the strongest, with the impulse of the last substep. gContactStarted-,
+/// -Processed- and -EndedCallback hear of them, and may remove any shell or body, except (as everywhere in Bullet) in
+/// an end that a removal causes. Bullet's solvers never respond to them.
 class ShellWorld : public btActionInterface {
   public:
     /// Throws std::invalid_argument for a btSimpleDynamicsWorld, which runs no actions.

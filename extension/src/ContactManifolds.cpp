@@ -1,0 +1,190 @@
+#include "ContactManifolds.h"
+
+#include <BulletCollision/BroadphaseCollision/btCollisionAlgorithm.h>
+#include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
+#include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
+#include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "Convert.h"
+#include "ShellProxy.h"
+
+namespace jacket::bullet {
+namespace {
+
+/// A contact point and the piece of the shell it belongs to.
+struct FeaturePoint {
+    int feature;
+    btManifoldPoint point;
+};
+
+/// Some triangle that has the vertex or edge of a contact, or its triangle.
+int triangleOf(const HalfEdgeMesh& mesh, int feature) {
+    const int edges = static_cast<int>(mesh.edges().size());
+    if (feature >= mesh.vertexCount() + edges) return feature - mesh.vertexCount() - edges;
+    if (feature >= mesh.vertexCount()) return mesh.edges()[feature - mesh.vertexCount()].halfEdge / 3;
+    const auto around = mesh.trianglesAround(feature);
+    return around.empty() ? -1 : around.front();
+}
+
+FeaturePoint toManifoldPoint(const ShellBody& shell, const btCollisionObject& body, const ContactImpulse& impulse) {
+    const Contact& contact = impulse.contact;
+    const btVector3 onBody = toBullet(contact.point),
+                    onShell = toBullet(Vec3(contact.point + contact.gap * contact.normal));
+    btManifoldPoint point(onShell, body.getWorldTransform().inverse() * onBody, toBullet(contact.normal),
+                          btScalar(contact.gap));
+    point.m_positionWorldOnA = onShell;
+    point.m_positionWorldOnB = onBody;
+    point.m_partId0 = 0;
+    point.m_index0 = triangleOf(shell.shell().mesh(), contact.feature);
+    point.m_combinedFriction = btScalar(contact.friction);
+    const double along = impulse.impulse.dot(contact.normal);
+    const Vec3 across = impulse.impulse - along * contact.normal;
+    point.m_appliedImpulse = btScalar(along);
+    point.m_appliedImpulseLateral1 = btScalar(across.norm());
+    point.m_lateralFrictionDir1 = toBullet(Vec3(across.stableNormalized()));
+    return {contact.feature, point};
+}
+
+}  // namespace
+
+/// The collision algorithm of a broadphase pair. It computes nothing: it sits in the pair because that is how Bullet
+/// says, for every broadphase, that shell or body have left the world or drifted apart. Small, as it must fit into the
+/// dispatcher's pool, whose size is the user's choice.
+class ContactManifolds::Pair final : public btCollisionAlgorithm {
+  public:
+    struct State {
+        btPersistentManifold& manifold;
+        std::array<int, MANIFOLD_CACHE_SIZE> features{};
+    };
+    Pair(const btCollisionAlgorithmConstructionInfo& info, ContactManifolds& owner, btPersistentManifold& manifold)
+        : btCollisionAlgorithm(info), m_owner(owner), m_state(std::make_unique<State>(manifold)) {
+        manifold.setContactProcessingThreshold(btScalar(-BT_LARGE_FLOAT));  // solvers convert no point of it
+    }
+    ~Pair() override {
+        std::erase(m_owner.m_pairs, this);
+        m_dispatcher->releaseManifold(&m_state->manifold);
+    }
+    void processCollision(const btCollisionObjectWrapper*, const btCollisionObjectWrapper*, const btDispatcherInfo&,
+                          btManifoldResult*) override {}
+    btScalar calculateTimeOfImpact(btCollisionObject*, btCollisionObject*, const btDispatcherInfo&,
+                                   btManifoldResult*) override {
+        return btScalar(1);
+    }
+    void getAllContactManifolds(btManifoldArray& manifolds) override { manifolds.push_back(&m_state->manifold); }
+
+    btPersistentManifold& manifold() const { return m_state->manifold; }
+    void setPoints(std::span<const FeaturePoint> points);
+
+  private:
+    ContactManifolds& m_owner;
+    std::unique_ptr<State> m_state;
+};
+
+/// Points that are still there keep their age and the user's data; their order is that of `points`.
+void ContactManifolds::Pair::setPoints(std::span<const FeaturePoint> points) {
+    btPersistentManifold& manifold = m_state->manifold;
+    std::array<btManifoldPoint, MANIFOLD_CACHE_SIZE> old;
+    const auto oldFeatures = m_state->features;
+    const int oldCount = manifold.getNumContacts();
+    for (int i = 0; i < oldCount; ++i) old[i] = manifold.getContactPoint(i);
+
+    manifold.setNumContacts(static_cast<int>(points.size()));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        btManifoldPoint& point = manifold.getContactPoint(static_cast<int>(i));
+        point = points[i].point;
+        m_state->features[i] = points[i].feature;
+        for (int k = 0; k < oldCount; ++k) {
+            if (oldFeatures[k] != points[i].feature) continue;
+            point.m_lifeTime = old[k].m_lifeTime + 1;
+            point.m_userPersistentData = std::exchange(old[k].m_userPersistentData, nullptr);
+        }
+    }
+    for (int k = 0; k < oldCount; ++k) manifold.clearUserCache(old[k]);  // calls gContactDestroyedCallback
+}
+
+/// A pair that touches, with its strongest contacts.
+struct ContactManifolds::Touch {
+    Pair* pair;
+    std::vector<FeaturePoint> points;
+};
+
+std::vector<ContactManifolds::Touch> ContactManifolds::collect(btCollisionWorld& world,
+                                                               std::span<const std::unique_ptr<ShellBody>> shells) {
+    std::vector<Touch> touches;
+    for (const auto& shell : shells) {
+        for (std::size_t i = 0; i < shell->contacts().size(); ++i) {
+            const btCollisionObject& body = *shell->contactBodies()[i];
+            Pair* pair = pairOf(world, *shell, body);
+            if (!pair) continue;
+            auto touch = std::find_if(touches.begin(), touches.end(), [&](const Touch& t) { return t.pair == pair; });
+            if (touch == touches.end()) touch = touches.insert(touch, {pair, {}});
+            touch->points.push_back(toManifoldPoint(*shell, body, shell->contacts()[i]));
+        }
+    }
+    for (Touch& touch : touches) {
+        std::stable_sort(touch.points.begin(), touch.points.end(), [](const auto& a, const auto& b) {
+            return a.point.m_appliedImpulse > b.point.m_appliedImpulse;
+        });
+        if (touch.points.size() > MANIFOLD_CACHE_SIZE) touch.points.resize(MANIFOLD_CACHE_SIZE);
+    }
+    return touches;
+}
+
+/// None when the broadphase has no such pair or the pool of manifolds is empty.
+ContactManifolds::Pair* ContactManifolds::pairOf(btCollisionWorld& world, ShellBody& shell,
+                                                 const btCollisionObject& body) {
+    btDispatcher& dispatcher = *world.getDispatcher();
+    const btCollisionObject& proxy = shell.collisionObject();
+    btBroadphasePair* found =
+        world.getPairCache()->findPair(const_cast<btBroadphaseProxy*>(proxy.getBroadphaseHandle()),
+                                       const_cast<btBroadphaseProxy*>(body.getBroadphaseHandle()));
+    if (!found) return nullptr;
+    const auto known = std::find(m_pairs.begin(), m_pairs.end(), found->m_algorithm);
+    if (known != m_pairs.end()) return *known;
+    world.getPairCache()->cleanOverlappingPair(*found, &dispatcher);  // Bullet's own, made before the pair was hidden
+    btPersistentManifold* manifold = dispatcher.getNewManifold(&proxy, &body);
+    if (!manifold) return nullptr;
+    const btCollisionAlgorithmConstructionInfo info(&dispatcher, 0);
+    Pair* pair = new (dispatcher.allocateCollisionAlgorithm(sizeof(Pair))) Pair(info, *this, *manifold);
+    found->m_algorithm = pair;
+    m_pairs.push_back(pair);
+    return pair;
+}
+
+bool ContactManifolds::isAlive(const Pair* pair) const {
+    return std::find(m_pairs.begin(), m_pairs.end(), pair) != m_pairs.end();
+}
+
+void ContactManifolds::update(btCollisionWorld& world, std::span<const std::unique_ptr<ShellBody>> shells) {
+    const std::vector<Touch> touches = collect(world, shells);
+    // From here on every callback may remove shells and bodies, and with them pairs: ask before using one.
+    for (Pair* pair : std::vector<Pair*>(m_pairs)) {
+        const bool touching =
+            std::any_of(touches.begin(), touches.end(), [&](const Touch& t) { return t.pair == pair; });
+        if (touching || !isAlive(pair) || pair->manifold().getNumContacts() == 0) continue;
+        btPersistentManifold* manifold = &pair->manifold();
+        pair->setPoints({});  // first, or a callback that removes the body would end the contact once more
+        if (gContactEndedCallback && isAlive(pair)) gContactEndedCallback(manifold);
+    }
+    for (const Touch& touch : touches) {
+        if (!isAlive(touch.pair)) continue;
+        btPersistentManifold* manifold = &touch.pair->manifold();
+        const bool starts = manifold->getNumContacts() == 0;
+        touch.pair->setPoints(touch.points);
+        if (starts && gContactStartedCallback && isAlive(touch.pair)) gContactStartedCallback(manifold);
+    }
+    for (const Touch& touch : touches) {
+        for (int i = 0; isAlive(touch.pair) && i < touch.pair->manifold().getNumContacts(); ++i) {
+            if (!gContactProcessedCallback) return;
+            btPersistentManifold& manifold = touch.pair->manifold();
+            gContactProcessedCallback(manifold.getContactPoint(i), const_cast<btCollisionObject*>(manifold.getBody0()),
+                                      const_cast<btCollisionObject*>(manifold.getBody1()));
+        }
+    }
+}
+
+}  // namespace jacket::bullet
