@@ -1,0 +1,170 @@
+// What ShellDynamicsWorld adds: even motion of kinematic bodies, and shells drawn between fixed steps.
+#include <gtest/gtest.h>
+#include <jacket/bullet/ShellDynamicsWorld.h>
+
+#include <cmath>
+
+#include "coupled/Worlds.h"
+#include "support/BulletScene.h"
+
+namespace jacket::testing {
+template <>
+struct WorldParts<bullet::ShellDynamicsWorld<btMultiBodyDynamicsWorld>> {
+    btDefaultCollisionConfiguration configuration;
+    btCollisionDispatcher dispatcher{&configuration};
+    btDbvtBroadphase broadphase;
+    btMultiBodyConstraintSolver solver;
+    bullet::ShellDynamicsWorld<btMultiBodyDynamicsWorld> world{&dispatcher, &broadphase, &solver, &configuration};
+};
+}  // namespace jacket::testing
+
+namespace jacket::bullet::testing {
+namespace {
+
+using jacket::testing::Scene;
+
+using InterpolatingScene = Scene<ShellDynamicsWorld<>>;
+
+/// Poses of a body at the end of every substep.
+struct Recorder {
+    btRigidBody* body = nullptr;
+    std::vector<btTransform> poses;
+    static void tick(btDynamicsWorld* world, btScalar) {
+        auto& self = *static_cast<Recorder*>(world->getWorldUserInfo());
+        self.poses.push_back(self.body->getWorldTransform());
+    }
+};
+
+TEST(ShellDynamicsWorld, AKinematicBodyGoesItsWayEvenlyOverTheSubsteps) {
+    InterpolatingScene scene(0.0);
+    auto& pusher = scene.addBox(btVector3(1, 1, 1), 0, btVector3(0, 0, 0));
+    pusher.setCollisionFlags(btCollisionObject::CF_KINEMATIC_OBJECT);
+    pusher.setActivationState(DISABLE_DEACTIVATION);
+    Recorder recorder{&pusher, {}};
+    scene.world.setInternalTickCallback(&Recorder::tick, &recorder);
+    for (int frame = 1; frame <= 2; ++frame) {
+        recorder.poses.clear();
+        const btQuaternion turn(btVector3(0, 1, 0), btScalar(frame));  // 1 rad a frame
+        pusher.setWorldTransform(btTransform(turn, btVector3(0, btScalar(0.4 * frame), 0)));
+        scene.world.stepSimulation(btScalar(4.0 / 240), 10, btScalar(1.0 / 240));
+        ASSERT_EQ(recorder.poses.size(), 4u);
+        for (int k = 1; k <= 4; ++k) {
+            const btTransform& pose = recorder.poses[k - 1];
+            EXPECT_NEAR(pose.getOrigin().y(), 0.4 * (frame - 1 + k / 4.0), bulletTolerance(1e-9, 1e-5));
+            EXPECT_NEAR(
+                btQuaternion(btVector3(0, 1, 0), btScalar(frame - 1 + k / 4.0)).angleShortestPath(pose.getRotation()),
+                0.0, bulletTolerance(1e-6, 1e-3));
+        }
+        EXPECT_EQ(pusher.getWorldTransform().getOrigin().y(), btScalar(0.4 * frame));
+    }
+    EXPECT_NEAR(pusher.getLinearVelocity().y(), 0.4 * 60, bulletTolerance(1e-9, 1e-3));
+}
+
+/// Lifted by 3 cm a frame of 4 substeps, the sheet on a plate never is that far off it.
+TEST(ShellDynamicsWorld, ASheetStaysOnAKinematicPlate) {
+    InterpolatingScene scene;
+    auto& plate = scene.addBox(btVector3(1, btScalar(0.1), 1), 0, btVector3(0, btScalar(-0.1), 0));
+    plate.setCollisionFlags(btCollisionObject::CF_KINEMATIC_OBJECT);
+    plate.setActivationState(DISABLE_DEACTIVATION);
+    TriangleMesh mesh = squareSheet(1, 4);
+    mesh.positions.row(1).array() += 1e-3;
+    auto& sheet = scene.world.shells().add(mesh, trampolineCloth());
+    struct Gap {
+        btRigidBody& plate;
+        ShellBody& sheet;
+        double deepest = 0.0;
+        static void tick(btDynamicsWorld* world, btScalar) {
+            auto& self = *static_cast<Gap*>(world->getWorldUserInfo());
+            self.deepest = std::max(self.deepest, penetration(self.sheet, self.plate));
+        }
+    } gap{plate, sheet};
+    for (int frame = 0; frame < 40; ++frame) {
+        if (frame == 10) scene.world.setInternalTickCallback(&Gap::tick, &gap);  // at rest, then lifted
+        btTransform pose = plate.getWorldTransform();
+        if (frame > 10) pose.getOrigin() += btVector3(0, btScalar(0.03), 0);
+        plate.setWorldTransform(pose);
+        scene.world.stepSimulation(btScalar(4.0 / 240), 10, btScalar(1.0 / 240));
+    }
+    EXPECT_GT(sheet.positions()[12].y(), 0.8);
+    EXPECT_LT(gap.deepest, 0.03 / 4 + 1e-3);  // the first substep's motion comes as a surprise, no other does
+}
+
+TEST(ShellDynamicsWorld, DrawsShellsBetweenFixedSteps) {
+    InterpolatingScene scene;
+    auto& sheet = scene.world.shells().add(squareSheet(1, 4), trampolineCloth());
+    sheet.pin(0);
+    const btScalar fixed = btScalar(1.0 / 64), frame = fixed / 8;  // exact in binary
+    std::vector<btVector3> drawn(sheet.vertexCount()), before(sheet.vertexCount()), last;
+    for (int i = 1; i <= 160; ++i) {
+        const std::vector<btVector3> old(sheet.positions().begin(), sheet.positions().end());
+        const bool stepped = scene.world.stepSimulation(frame, 4, fixed) > 0;
+        ASSERT_EQ(stepped, i % 8 == 0);
+        if (stepped) before = old;
+        scene.world.renderPositions(sheet, drawn);
+        for (int v = 0; v < sheet.vertexCount() && i >= 8; ++v) {
+            const btVector3 expected = before[v].lerp(sheet.positions()[v], btScalar(i % 8) / 8);
+            ASSERT_LT((drawn[v] - expected).length(), bulletTolerance(1e-12, 1e-6)) << "frame " << i;
+            // No jump where a step begins: nothing is drawn to move faster than it moves.
+            if (i > 8) {
+                ASSERT_LT((drawn[v] - last[v]).length(), 1.01 * 9.81 * 2.5 / 8 / 64 + 1e-6) << "frame " << i;
+            }
+        }
+        last = drawn;
+    }
+    EXPECT_LT(sheet.positions()[24].y(), -0.1);
+}
+
+TEST(ShellDynamicsWorld, DrawsAheadWithoutLatency) {
+    InterpolatingScene scene;
+    auto& sheet = scene.world.shells().add(squareSheet(1, 4), trampolineCloth());
+    scene.world.setLatencyMotionStateInterpolation(false);
+    scene.world.stepSimulation(btScalar(1.5 / 64), 4, btScalar(1.0 / 64));
+    std::vector<btVector3> drawn(sheet.vertexCount());
+    scene.world.renderPositions(sheet, drawn);
+    const btVector3 expected = sheet.positions()[7] + btScalar(0.5 / 64) * sheet.velocity(7);
+    EXPECT_LT((drawn[7] - expected).length(), bulletTolerance(1e-12, 1e-6));
+    drawn.pop_back();
+    EXPECT_THROW(scene.world.renderPositions(sheet, drawn), std::invalid_argument);
+}
+
+/// The motion state of a body and the shell that fell beside it are drawn at one height.
+TEST(ShellDynamicsWorld, DrawsShellsAndMotionStatesAtTheSameTime) {
+    InterpolatingScene scene;
+    auto& sheet = scene.world.shells().add(squareSheet(1, 4), trampolineCloth(), {.tolerance = 1e-8});
+    btDefaultMotionState state(btTransform(btQuaternion::getIdentity(), btVector3(5, 0, 0)));
+    auto& ball = scene.addSphere(0.1, 1.0, btVector3(5, 0, 0));
+    ball.setMotionState(&state);
+    std::vector<btVector3> drawn(sheet.vertexCount());
+    for (int i = 0; i < 100; ++i) {
+        scene.world.stepSimulation(btScalar(1.0 / 144), 4, btScalar(1.0 / 60));
+        scene.world.renderPositions(sheet, drawn);
+        if (i < 3) continue;  // before the first step Bullet extrapolates backwards
+        ASSERT_NEAR(drawn[7].y(), state.m_graphicsWorldTrans.getOrigin().y(), bulletTolerance(1e-6, 1e-4)) << i;
+    }
+}
+
+TEST(ShellDynamicsWorld, IsAnyWorld) {
+    Scene<ShellDynamicsWorld<btMultiBodyDynamicsWorld>> scene;
+    auto& sheet = scene.world.shells().add(squareSheet(1, 4), trampolineCloth());
+    scene.addFloor(-0.1);
+    scene.run(0.5, 1.0 / 60);
+    EXPECT_NEAR(sheet.positions()[12].y(), -0.1, 1e-2);
+}
+
+TEST(ShellDynamicsWorld, AKinematicBodyMayLeaveBetweenSubsteps) {
+    InterpolatingScene scene;
+    auto& pusher = scene.addBox(btVector3(1, 1, 1), 0, btVector3(0, 0, 0));
+    pusher.setCollisionFlags(btCollisionObject::CF_KINEMATIC_OBJECT);
+    pusher.setActivationState(DISABLE_DEACTIVATION);
+    scene.world.setInternalTickCallback(
+        [](btDynamicsWorld* world, btScalar) {
+            auto& self = *static_cast<InterpolatingScene*>(world->getWorldUserInfo());
+            if (!self.bodies.empty()) self.remove(*self.bodies[0]);  // frees it
+        },
+        &scene);
+    scene.world.stepSimulation(btScalar(4.0 / 240), 10, btScalar(1.0 / 240));
+    EXPECT_EQ(scene.world.getNumCollisionObjects(), 0);
+}
+
+}  // namespace
+}  // namespace jacket::bullet::testing
