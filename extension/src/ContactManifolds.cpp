@@ -117,7 +117,7 @@ std::vector<ContactManifolds::Touch> ContactManifolds::collect(btCollisionWorld&
     std::vector<Touch> touches;
     for (const auto& shell : shells) {
         for (std::size_t i = 0; i < shell->contacts().size(); ++i) {
-            const btCollisionObject& body = *shell->contactBodies()[i];
+            const btCollisionObject& body = *shell->contacts()[i].object;
             Pair* pair = pairOf(world, *shell, body);
             if (!pair) continue;
             auto touch = std::find_if(touches.begin(), touches.end(), [&](const Touch& t) { return t.pair == pair; });

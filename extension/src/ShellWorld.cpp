@@ -273,7 +273,6 @@ void ShellWorld::accept(Island& island, const StepReport& report, const std::vec
     m_report.rejectedSteps += report.finite ? 0 : 1;
     for (ShellBody* shell : island.shells) {
         shell->m_contacts.clear();
-        shell->m_contactBodies.clear();
         shell->m_hasVelocity = report.finite;  // a rejected step: stands still, and is solved afresh
         shell->m_pendingGravity = pendingGravity;
     }

@@ -272,7 +272,7 @@ inline double penetration(const bullet::ShellBody& shell, const btCollisionObjec
 inline Vec3 contactImpulse(const bullet::ShellBody& shell, const btCollisionObject& body) {
     Vec3 sum = Vec3::Zero();
     for (std::size_t i = 0; i < shell.contacts().size(); ++i)
-        if (shell.contactBodies()[i] == &body) sum -= shell.contacts()[i].impulse;
+        if (shell.contacts()[i].object == &body) sum -= shell.contacts()[i].impulse;
     return sum;
 }
 /// The same, to all bodies.
