@@ -18,18 +18,6 @@ double closestOnSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
     return length2 > 0 ? std::clamp((p - a).dot(ab) / length2, 0.0, 1.0) : 0.0;
 }
 
-/// Parameters of the nearest points of two segments; the first end of parallel ones. Both may have length zero.
-std::array<double, 2> closestOfSegments(const Vec3& a0, const Vec3& a1, const Vec3& b0, const Vec3& b1) {
-    const Vec3 a = a1 - a0, b = b1 - b0, ab = a0 - b0;
-    const double aa = a.squaredNorm(), bb = b.squaredNorm();
-    const double determinant = a.cross(b).squaredNorm();
-    double s = 0;
-    if (determinant > 1e-24 * aa * bb)  // else parallel: any s will do, and the clamps below find the overlap
-        s = std::clamp((a.dot(b) * b.dot(ab) - bb * a.dot(ab)) / determinant, 0.0, 1.0);
-    const double t = closestOnSegment(a0 + s * a, b0, b1);
-    return {closestOnSegment(b0 + t * b, a0, a1), t};
-}
-
 /// Unit vector from the y axis to p; x on the axis itself.
 Vec3 radialDirection(const Vec3& p) {
     const double rho = std::hypot(p.x(), p.z());
@@ -53,6 +41,17 @@ TrianglePoint touching(const Barycentric& b, const Vec3& normal, double distance
 }
 
 }  // namespace
+
+std::array<double, 2> closestOfSegments(const Vec3& a0, const Vec3& a1, const Vec3& b0, const Vec3& b1) {
+    const Vec3 a = a1 - a0, b = b1 - b0, ab = a0 - b0;
+    const double aa = a.squaredNorm(), bb = b.squaredNorm();
+    const double determinant = a.cross(b).squaredNorm();
+    double s = 0;
+    if (determinant > 1e-24 * aa * bb)  // else parallel: any s will do, and the clamps below find the overlap
+        s = std::clamp((a.dot(b) * b.dot(ab) - bb * a.dot(ab)) / determinant, 0.0, 1.0);
+    const double t = closestOnSegment(a0 + s * a, b0, b1);
+    return {closestOnSegment(b0 + t * b, a0, a1), t};
+}
 
 Vec3 anyPerpendicular(const Vec3& v) {
     int smallest = 0;

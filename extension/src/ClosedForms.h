@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -16,6 +17,9 @@ struct Barycentric {
     Vec3 point = Vec3::Zero();
 };
 Barycentric closestOnTriangle(const Vec3& p, const Mat3& triangle);
+
+/// Parameters of the nearest points of two segments; the first end of parallel ones. Both may have length zero.
+std::array<double, 2> closestOfSegments(const Vec3& a0, const Vec3& a1, const Vec3& b0, const Vec3& b1);
 
 /// Unit normal of a triangle; for a sliver, some unit vector across its longest edge.
 Vec3 triangleNormal(const Mat3& triangle);

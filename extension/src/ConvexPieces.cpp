@@ -1,15 +1,20 @@
 #include "ConvexPieces.h"
 
+#include <BulletCollision/CollisionShapes/btBox2dShape.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
+#include <BulletCollision/CollisionShapes/btConcaveShape.h>
 #include <BulletCollision/CollisionShapes/btConeShape.h>
+#include <BulletCollision/CollisionShapes/btConvex2dShape.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
 #include <BulletCollision/CollisionShapes/btMinkowskiSumShape.h>
+#include <BulletCollision/CollisionShapes/btSdfCollisionShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletCollision/CollisionShapes/btUniformScalingShape.h>
+#include <BulletCollision/Gimpact/btGImpactShape.h>
 
 #include <limits>
 #include <utility>
@@ -194,6 +199,9 @@ SphereForm formOf(const btSphereShape& s) {
 BoxForm formOf(const btBoxShape& s) {
     return {fromBullet(s.getHalfExtentsWithMargin())};
 }
+BoxForm formOf(const btBox2dShape& s) {
+    return {fromBullet(s.getHalfExtentsWithMargin())};
+}
 CapsuleForm formOf(const btCapsuleShape& s) {
     return {double(s.getRadius()), double(s.getHalfHeight())};
 }
@@ -244,6 +252,10 @@ std::unique_ptr<SupportMap> makeMap(const btConvexShape& shape) {
             return mapOf(formOf(as<btSphereShape>(shape)));
         case BOX_SHAPE_PROXYTYPE:
             return mapOf(formOf(as<btBoxShape>(shape)));
+        case BOX_2D_SHAPE_PROXYTYPE:
+            return mapOf(formOf(as<btBox2dShape>(shape)));
+        case CONVEX_2D_SHAPE_PROXYTYPE:
+            return makeMap(*as<btConvex2dShape>(shape).getChildShape());
         case CAPSULE_SHAPE_PROXYTYPE:
             return mapOf(formOf(as<btCapsuleShape>(shape)), as<btCapsuleShape>(shape).getUpAxis());
         case CYLINDER_SHAPE_PROXYTYPE:
@@ -282,6 +294,10 @@ std::unique_ptr<ConvexPiece> makePiece(const btConvexShape& shape, const Frame& 
             return place(ExactSolid<SphereForm>{formOf(as<btSphereShape>(shape))}, frame);
         case BOX_SHAPE_PROXYTYPE:
             return place(PointExactSolid<BoxForm>(formOf(as<btBoxShape>(shape))), frame);
+        case BOX_2D_SHAPE_PROXYTYPE:
+            return place(PointExactSolid<BoxForm>(formOf(as<btBox2dShape>(shape))), frame);
+        case CONVEX_2D_SHAPE_PROXYTYPE:
+            return makePiece(*as<btConvex2dShape>(shape).getChildShape(), frame);
         case CAPSULE_SHAPE_PROXYTYPE: {
             const auto& capsule = as<btCapsuleShape>(shape);
             return place(ExactSolid<CapsuleForm>{formOf(capsule)}, frame * upright(capsule.getUpAxis()));
@@ -303,24 +319,35 @@ std::unique_ptr<ConvexPiece> makePiece(const btConvexShape& shape, const Frame& 
     }
 }
 
-void collect(const btCollisionShape& shape, const Frame& frame, std::vector<std::unique_ptr<ConvexPiece>>& pieces,
-             std::vector<std::string>& unsupported) {
+const btGImpactCompoundShape* asGImpactCompound(const btCollisionShape& shape) {
+    if (shape.getShapeType() != GIMPACT_SHAPE_PROXYTYPE) return nullptr;
+    const auto& impact = as<btGImpactShapeInterface>(shape);
+    return impact.getGImpactShapeType() == CONST_GIMPACT_COMPOUND_SHAPE ? &as<btGImpactCompoundShape>(shape) : nullptr;
+}
+
+/// Calls use(part, frame) for the shape, or for every child of a compound.
+template <class Use>
+void forEachPart(const btCollisionShape& shape, const Frame& frame, const Use& use) {
+    const auto* impact = asGImpactCompound(shape);
     if (shape.isCompound()) {
         const auto& compound = as<btCompoundShape>(shape);
-        for (int i = 0; i < compound.getNumChildShapes(); ++i) {
-            const Frame child = frame * fromBullet(compound.getChildTransform(i));
-            collect(*compound.getChildShape(i), child, pieces, unsupported);
+        for (int i = 0; i < compound.getNumChildShapes(); ++i)
+            forEachPart(*compound.getChildShape(i), frame * fromBullet(compound.getChildTransform(i)), use);
+    } else if (impact) {
+        for (int i = 0; i < impact->getNumChildShapes(); ++i) {
+            const Frame child =
+                impact->childrenHasTransform() ? fromBullet(impact->getChildTransform(i)) : Frame(Frame::Identity());
+            forEachPart(*impact->getChildShape(i), frame * child, use);
         }
-    } else if (shape.getShapeType() == STATIC_PLANE_PROXYTYPE) {
-        pieces.push_back(place(ExactSolid<HalfSpaceForm>{formOf(as<btStaticPlaneShape>(shape))}, frame));
-    } else if (shape.getShapeType() == CONVEX_HULL_SHAPE_PROXYTYPE &&
-               as<btConvexHullShape>(shape).getNumPoints() == 0) {
-        unsupported.emplace_back("empty Convex");
-    } else if (shape.isConvex()) {
-        pieces.push_back(makePiece(as<btConvexShape>(shape), frame));
     } else {
-        unsupported.emplace_back(shape.getName());
+        use(shape, frame);
     }
+}
+
+/// Bullet's distance fields list no triangles.
+bool hasTriangles(const btCollisionShape& shape) {
+    return shape.isConcave() && shape.getShapeType() != STATIC_PLANE_PROXYTYPE &&
+           !dynamic_cast<const btSdfCollisionShape*>(&shape);
 }
 
 }  // namespace
@@ -332,8 +359,40 @@ std::unique_ptr<ConvexPiece> makeCcdPiece(const btConvexShape& shape, const Fram
 std::vector<std::unique_ptr<ConvexPiece>> makeConvexPieces(const btCollisionShape& shape,
                                                            std::vector<std::string>& unsupported) {
     std::vector<std::unique_ptr<ConvexPiece>> pieces;
-    collect(shape, Frame::Identity(), pieces, unsupported);
+    forEachPart(shape, Frame::Identity(), [&](const btCollisionShape& part, const Frame& frame) {
+        if (part.getShapeType() == STATIC_PLANE_PROXYTYPE)
+            pieces.push_back(place(ExactSolid<HalfSpaceForm>{formOf(as<btStaticPlaneShape>(part))}, frame));
+        else if (part.getShapeType() == CONVEX_HULL_SHAPE_PROXYTYPE && as<btConvexHullShape>(part).getNumPoints() == 0)
+            unsupported.emplace_back("empty Convex");
+        else if (part.isConvex())
+            pieces.push_back(makePiece(as<btConvexShape>(part), frame));
+        else if (!hasTriangles(part))
+            unsupported.emplace_back(part.getName());
+    });
     return pieces;
+}
+
+std::vector<ConcavePiece> concavePieces(const btCollisionShape& shape) {
+    std::vector<ConcavePiece> pieces;
+    forEachPart(shape, Frame::Identity(), [&](const btCollisionShape& part, const Frame& frame) {
+        if (hasTriangles(part)) pieces.push_back({&as<btConcaveShape>(part), frame});
+    });
+    return pieces;
+}
+
+std::size_t fingerprintOf(const btCollisionShape& shape) {
+    std::size_t hash = 0;
+    const auto mix = [&](auto value) { hash = 31 * hash + std::hash<decltype(value)>{}(value); };
+    forEachPart(shape, Frame::Identity(), [&](const btCollisionShape& part, const Frame& frame) {
+        mix(&part);
+        mix(part.getShapeType());
+        for (const double entry : frame.matrix().topRows<3>().reshaped()) mix(entry);
+        if (hasTriangles(part)) return;
+        btVector3 lower, upper;
+        part.getAabb(btTransform::getIdentity(), lower, upper);
+        for (int k = 0; k < 3; ++k) mix(lower[k]), mix(upper[k]);
+    });
+    return hash;
 }
 
 }  // namespace jacket::bullet

@@ -1,6 +1,6 @@
 #include "Obstacles.h"
 
-#include <BulletCollision/CollisionShapes/btCompoundShape.h>
+#include <BulletCollision/CollisionShapes/btCollisionShape.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 
@@ -8,7 +8,6 @@
 #include <algorithm>
 
 #include "Checks.h"
-#include "ConvexPieces.h"
 #include "CoupledLinks.h"
 #include "jacket/Types.h"
 
@@ -138,18 +137,14 @@ bool Obstacles::isUsable(const btCollisionObject& object) {
 }
 
 const ShapePieces& Obstacles::piecesOf(const btCollisionShape& shape) {
-    btVector3 lower, upper;
-    shape.getAabb(btTransform::getIdentity(), lower, upper);
-    const int children =
-        shape.isCompound() ? static_cast<const btCompoundShape&>(shape).getUpdateRevision() : shape.getShapeType();
+    const std::size_t fingerprint = fingerprintOf(shape);
     const auto [entry, fresh] = m_shapes.try_emplace(&shape);
     ShapePieces& known = entry->second;
-    if (!fresh && known.children == children && known.lower == lower && known.upper == upper) return known;
+    if (!fresh && known.fingerprint == fingerprint) return known;
     std::vector<std::string> unsupported;
     known.pieces = makeConvexPieces(shape, unsupported);
-    known.lower = lower;
-    known.upper = upper;
-    known.children = children;
+    known.concave = concavePieces(shape);
+    known.fingerprint = fingerprint;
     for (const std::string& name : unsupported) {
         if (std::find(m_warnedNames.begin(), m_warnedNames.end(), name) != m_warnedNames.end()) continue;
         m_warnedNames.push_back(name);

@@ -8,18 +8,19 @@
 #include <vector>
 
 #include "Convert.h"
-#include "ConvexContact.h"
+#include "ConvexPieces.h"
 #include "jacket/Contact.h"
 
 class btRigidBody;
 
 namespace jacket::bullet {
 
-/// The convex pieces of a collision shape, and what shows that the shape has changed under us.
+/// The pieces of a collision shape, and what shows that the shape has changed under us. Concave pieces are only named:
+/// their triangles are read from the shape in every step.
 struct ShapePieces {
     std::vector<std::unique_ptr<ConvexPiece>> pieces;
-    btVector3 lower, upper;  ///< Bullet's bounds at identity
-    int children = 0;
+    std::vector<ConcavePiece> concave;
+    std::size_t fingerprint = 0;
 };
 
 /// One collision object near a shell: its pieces, its pose at the start of the step and its part in the solve.

@@ -1,10 +1,32 @@
 #include "ShellContacts.h"
 
+#include <algorithm>
 #include <array>
 #include <limits>
 
 namespace jacket::bullet {
 namespace {
+
+constexpr double kSameSide = 0.97;  // cosine of the angle below which two normals at a vertex count as one
+
+bool isAbove(const Vec3& point, const SurfacePoint& plane) {
+    const Vec3 offset = point - plane.point;
+    return plane.normal.dot(offset) > 1e-6 * offset.norm();
+}
+
+/// Does holding a vertex off one surface say all that another one could? Behind a surface: is it outside once the
+/// deeper one has pushed it out; in front: does that one lie behind the plane of the nearer.
+bool isCovered(const SurfacePoint& surface, const SurfacePoint& nearer) {
+    if (surface.normal.dot(nearer.normal) > kSameSide) return true;
+    if (surface.distance < 0) return surface.normal.dot(nearer.point - surface.point) >= 0;
+    return !isAbove(surface.point, nearer);
+}
+
+double meanEdge(const HalfEdgeMesh& mesh, const Points& x) {
+    double sum = 0.0;
+    for (const auto& e : mesh.edges()) sum += (x.col(e.v0) - x.col(e.v1)).norm();
+    return sum / static_cast<double>(std::max<std::size_t>(1, mesh.edges().size()));
+}
 
 /// Bounds of a piece, in the world.
 void worldBounds(const ConvexPiece& piece, const Frame& frame, Vec3& lower, Vec3& upper) {
@@ -23,25 +45,33 @@ void worldBounds(const ConvexPiece& piece, const Frame& frame, Vec3& lower, Vec3
 
 /// One shell against one obstacle at one pose.
 struct ShellContacts::Query {
-    int shell, body;
+    int pair, shell, body;
     const ShellBody& shellBody;
     const Points& x;
     Frame frame;  ///< of the obstacle
     double vertexReach, faceReach, friction;
     std::vector<Contact>& contacts;
     double thickness() const { return shellBody.contactThickness(); }
+    bool wantsFaces() const { return faceReach > -std::numeric_limits<double>::infinity(); }
 };
 
 ShellContacts::ShellContacts(std::vector<const ShellBody*> shells, const std::vector<Obstacle>& obstacles,
                              std::vector<std::pair<int, int>> pairs)
-    : m_shells(std::move(shells)), m_obstacles(obstacles), m_pairs(std::move(pairs)) {}
+    : m_shells(std::move(shells)), m_obstacles(obstacles), m_pairs(std::move(pairs)) {
+    m_sides.resize(m_pairs.size());
+    m_depth.assign(m_pairs.size(), 0.0);
+    for (const auto& [shell, body] : m_pairs) m_patches.emplace_back(m_obstacles[body].shape->concave.size());
+}
 
 void ShellContacts::find(const ContactPose& pose, double vertexReach, double faceReach,
                          std::vector<Contact>& contacts) {
-    for (const auto& [shell, body] : m_pairs) {
+    for (int pair = 0; pair < int(m_pairs.size()); ++pair) {
+        const auto [shell, body] = m_pairs[pair];
         const Obstacle& obstacle = m_obstacles[body];
         m_byFeature.clear();
-        Query query{shell,
+        m_candidates.clear();
+        Query query{pair,
+                    shell,
                     body,
                     *m_shells[shell],
                     *pose.positions[shell],
@@ -52,8 +82,11 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
                     contacts};
         for (const auto& piece : obstacle.shape->pieces) {
             findVertices(query, *piece);
-            if (faceReach > -std::numeric_limits<double>::infinity()) findFaces(query, *piece);
+            if (query.wantsFaces()) findFaces(query, *piece);
         }
+        for (std::size_t k = 0; k < obstacle.shape->concave.size(); ++k)
+            findConcave(query, obstacle.shape->concave[k], m_patches[pair][k]);
+        addVertices(query);
     }
 }
 
@@ -76,28 +109,120 @@ void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
         m_outside[i] = outside;
         if (outside) continue;
         if (const auto surface = piece.touch(Vec3(toBody * x), query.vertexReach + query.thickness()))
-            add(query, Feature::vertex(i), *surface, {i, i, i}, Vec3::UnitX());
+            m_candidates.push_back({i, *surface});
     }
 }
 
 void ShellContacts::findFaces(Query& query, const ConvexPiece& piece) {
     const HalfEdgeMesh& mesh = query.shellBody.shell().mesh();
     const Frame toBody = query.frame.inverse(Eigen::Isometry);
-    const int edgeCount = static_cast<int>(mesh.edges().size());
     for (int t = 0; t < mesh.triangleCount(); ++t) {
-        const auto column = mesh.triangles().col(t);
-        const std::array<int, 3> corners{column[0], column[1], column[2]};
+        const auto corners = mesh.triangles().col(t);
         if (m_outside[corners[0]] & m_outside[corners[1]] & m_outside[corners[2]]) continue;
         Mat3 triangle;
         for (int a = 0; a < 3; ++a) triangle.col(a) = toBody * Vec3(query.x.col(corners[a]));
         const auto touch = piece.touch(triangle, query.faceReach + query.thickness());
-        if (!touch || touch->weights.maxCoeff() > 1.0 - 1e-6) continue;  // a vertex contact says the same
-        int feature = Feature::triangle(t, mesh.vertexCount(), edgeCount);
-        for (int a = 0; a < 3; ++a)
-            if (touch->weights[a] <= 1e-9)
-                feature = Feature::edge(mesh.edgeOf(3 * t + (a + 1) % 3), mesh.vertexCount());
-        add(query, feature, touch->surface, corners, touch->weights);
+        if (touch) addFace(query, t, *touch);
     }
+}
+
+/// The triangles near the shell; the old ones if they still hold all of them. Bullet's shape is asked about once a
+/// step.
+void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::unique_ptr<TrianglePatch>& patch) {
+    if (!query.x.allFinite()) return;
+    const HalfEdgeMesh& mesh = query.shellBody.shell().mesh();
+    const double reach = query.vertexReach + query.thickness(), faceReach = query.faceReach + query.thickness();
+    // A vertex that has come from the front in this step, or stands no deeper than a triangle is wide, is pushed out.
+    double& depth = m_depth[query.pair];
+    if (depth == 0.0) depth = std::max(query.vertexReach, 0.5 * meanEdge(mesh, query.x));
+    const Points x = (piece.frame.inverse(Eigen::Isometry) * query.frame.inverse(Eigen::Isometry)) * query.x;
+    const double margin = std::max({reach, query.wantsFaces() ? faceReach : 0.0, depth});
+    Bounds near{x.rowwise().minCoeff().array() - margin, x.rowwise().maxCoeff().array() + margin};
+    if (!patch || !patch->box().contains(near)) {
+        near.lower.array() -= margin;
+        near.upper.array() += margin;
+        patch = std::make_unique<TrianglePatch>(*piece.shape, near);
+    }
+    std::vector<SurfacePoint> touched;
+    for (int i = 0; i < x.cols(); ++i) {
+        touched.clear();
+        patch->touch(Vec3(x.col(i)), reach, depth, touched);
+        for (const SurfacePoint& s : touched)
+            m_candidates.push_back({i, {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance}});
+    }
+    for (int t = 0; query.wantsFaces() && t < mesh.triangleCount(); ++t) {
+        Mat3 triangle;
+        for (int a = 0; a < 3; ++a) triangle.col(a) = x.col(mesh.triangles()(a, t));
+        auto touch = patch->touch(triangle, faceReach, depth);
+        if (!touch) continue;
+        touch->surface.point = piece.frame * touch->surface.point;
+        touch->surface.normal = piece.frame.linear() * touch->surface.normal;
+        addFace(query, t, *touch);
+    }
+}
+
+void ShellContacts::addFace(Query& query, int triangle, const TrianglePoint& touch) {
+    if (touch.weights.maxCoeff() > 1.0 - 1e-6) return;  // a vertex contact says the same
+    const HalfEdgeMesh& mesh = query.shellBody.shell().mesh();
+    const auto corners = mesh.triangles().col(triangle);
+    int feature = Feature::triangle(triangle, mesh.vertexCount(), static_cast<int>(mesh.edges().size()));
+    for (int a = 0; a < 3; ++a)
+        if (touch.weights[a] <= 1e-9)
+            feature = Feature::edge(mesh.edgeOf(3 * triangle + (a + 1) % 3), mesh.vertexCount());
+    add(query, feature, touch.surface, {corners[0], corners[1], corners[2]}, touch.weights);
+}
+
+/// Of all that a vertex can touch, what is not covered by something nearer.
+void ShellContacts::addVertices(Query& query) {
+    const HalfEdgeMesh& mesh = query.shellBody.shell().mesh();
+    const int featureCount = mesh.vertexCount() + static_cast<int>(mesh.edges().size()) + mesh.triangleCount();
+    std::stable_sort(m_candidates.begin(), m_candidates.end(), [](const Candidate& a, const Candidate& b) {
+        return std::pair(a.vertex, a.surface.distance) < std::pair(b.vertex, b.surface.distance);
+    });
+    std::vector<SurfacePoint> kept;
+    for (std::size_t first = 0, next; first < m_candidates.size(); first = next) {
+        const int vertex = m_candidates[first].vertex;
+        kept.clear();
+        for (next = first; next < m_candidates.size() && m_candidates[next].vertex == vertex; ++next) {
+            const SurfacePoint& surface = m_candidates[next].surface;
+            if (std::none_of(kept.begin(), kept.end(), [&](const auto& nearer) { return isCovered(surface, nearer); }))
+                kept.push_back(surface);
+        }
+        const std::vector<int> sides = sidesOf(m_sides[query.pair][vertex], kept);
+        for (std::size_t k = 0; k < kept.size(); ++k)
+            add(query, Feature::vertex(vertex) + sides[k] * featureCount, kept[k], {vertex, vertex, vertex},
+                Vec3::UnitX());
+    }
+}
+
+/// For each surface that a vertex touches the index of the known side that it belongs to: of much the same normal, or
+/// one over whose ridge the vertex has gone. Others become known.
+std::vector<int> ShellContacts::sidesOf(Sides& known, std::vector<SurfacePoint>& surfaces) {
+    if (known.empty())  // the same order in the next step, whichever is nearer then
+        std::sort(surfaces.begin(), surfaces.end(), [](const SurfacePoint& a, const SurfacePoint& b) {
+            return std::lexicographical_compare(a.normal.data(), a.normal.data() + 3, b.normal.data(),
+                                                b.normal.data() + 3);
+        });
+    std::vector<int> sides;
+    for (const SurfacePoint& surface : surfaces) {
+        const auto isFree = [&](int side) { return std::find(sides.begin(), sides.end(), side) == sides.end(); };
+        int best = -1, crossed = -1;
+        double most = kSameSide;
+        for (int side = 0; side < int(known.size()); ++side) {
+            if (!isFree(side)) continue;
+            const double along = known[side].normal.dot(surface.normal);
+            if (along > most) best = side, most = along;
+            if (!isAbove(surface.point, known[side])) crossed = side;
+        }
+        if (best < 0) best = crossed;
+        if (best < 0) {
+            best = int(known.size());
+            known.push_back(surface);
+        }
+        known[best] = surface;
+        sides.push_back(best);
+    }
+    return sides;
 }
 
 void ShellContacts::add(Query& query, int feature, const SurfacePoint& surface, const std::array<int, 3>& vertices,

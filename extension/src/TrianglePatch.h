@@ -1,0 +1,79 @@
+#pragma once
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "BoxTree.h"
+#include "Convert.h"
+#include "ConvexContact.h"
+
+class btConcaveShape;
+
+namespace jacket::bullet {
+
+/// The triangles of a concave shape that lie near a shell, in the shape's frame.
+///
+/// The surface is that of the triangles themselves, without Bullet's margin, and one-sided: a point behind it is pushed
+/// out to the front. The front is where corners are counter-clockwise; of a heightfield, up. A shape of negative scale
+/// is the mirror image. Corners at exactly the same place are one. Beyond an open border nothing is behind: the border
+/// is an edge like any other. Triangles that are not finite or have no area are left out.
+class TrianglePatch {
+  public:
+    /// Asks the shape for its triangles in the box, which must be finite.
+    TrianglePatch(const btConcaveShape& shape, const Bounds& box);
+
+    const Bounds& box() const { return m_box; }
+    int triangleCount() const { return int(m_triangles.size()); }
+
+    /// Appends what a point can touch: the nearest surface point if it is at most `reach` in front or `depth` behind,
+    /// and the further ones in front, within reach, that do not lie behind the plane of the first: the other side of a
+    /// valley. A point behind a valley's bottom gets every side of it.
+    void touch(const Vec3& p, double reach, double depth, std::vector<SurfacePoint>& touched) const;
+
+    /// Where a corner of the surface meets the inside of a triangle, or a ridge one of its edges: the deepest such
+    /// place, at most `reach` apart or `depth` deep. The triangle's own corners are left to touch() of points.
+    std::optional<TrianglePoint> touch(const Mat3& triangle, double reach, double depth) const;
+
+  private:
+    struct Edge {
+        int a, b;                  // corners
+        std::array<int, 2> faces;  // the second is -1 at a border
+        Vec3 normal;               // mean of its faces', unit
+        bool isRidge;              // convex or a border: something can hang on it
+    };
+    struct Corner {
+        Vec3 point;
+        Vec3 normal = Vec3::Zero();  // by the faces' angles, unit
+        bool isBorder = false;
+        std::vector<int> edges{}, faces{};
+    };
+    /// The point of the surface nearest to p, and whether p is behind it.
+    struct Nearest {
+        int face;
+        Vec3 weights, point;
+        double distance;
+        Vec3 normal;  // unit, out of the surface, along the way to p
+        bool isBehind;
+    };
+    void weld(const std::vector<Mat3>& triangles);
+    void connect();
+    void collectRidges();
+    Mat3 triangle(int face) const;
+    Nearest classify(int face, const Vec3& p, const Vec3& weights, const Vec3& point) const;
+    std::optional<Nearest> nearest(const Vec3& p, double radius) const;
+    void pushOut(const Nearest& nearest, const Vec3& p, std::vector<SurfacePoint>& touched) const;
+    bool isInside(const Vec3& p, double depth) const;
+    std::optional<TrianglePoint> touchTip(int corner, const Mat3& triangle) const;
+    std::optional<TrianglePoint> touchRidge(const Edge& ridge, const Mat3& triangle, int side) const;
+
+    Bounds m_box;
+    std::vector<Corner> m_corners;
+    std::vector<std::array<int, 3>> m_triangles;
+    std::vector<Vec3> m_normals;                // of the triangles
+    std::vector<std::array<int, 3>> m_edgesOf;  // of the triangles: edge i is opposite to corner i
+    std::vector<Edge> m_edges;
+    std::vector<int> m_ridges;
+    BoxTree m_tree, m_ridgeTree;
+};
+
+}  // namespace jacket::bullet

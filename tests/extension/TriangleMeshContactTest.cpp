@@ -1,0 +1,455 @@
+// Shells on concave shapes: triangle meshes, heightfields, GImpact meshes, compounds. Figures to compare with follow
+// from planes, weights and closed forms of the surfaces.
+#include <BulletCollision/CollisionShapes/btEmptyShape.h>
+#include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
+#include <BulletCollision/CollisionShapes/btMultimaterialTriangleMeshShape.h>
+#include <BulletCollision/CollisionShapes/btScaledBvhTriangleMeshShape.h>
+#include <BulletCollision/Gimpact/btGImpactShape.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "support/BulletScene.h"
+
+namespace jacket::bullet::testing {
+namespace {
+
+constexpr double kStep = 1.0 / 120;
+
+/// A triangulated surface y = height(x, z) over a square of given side about the origin, facing up.
+std::unique_ptr<btTriangleMesh> surfaceMesh(double side, int cells, const std::function<double(double, double)>& height,
+                                            double unit = 1.0) {
+    auto mesh = std::make_unique<btTriangleMesh>();
+    const auto at = [&](int i, int j) {
+        const double x = side * (double(i) / cells - 0.5), z = side * (double(j) / cells - 0.5);
+        return btVector3(btScalar(x / unit), btScalar(height(x, z) / unit), btScalar(z / unit));
+    };
+    for (int i = 0; i < cells; ++i)
+        for (int j = 0; j < cells; ++j) {
+            mesh->addTriangle(at(i, j), at(i, j + 1), at(i + 1, j + 1));
+            mesh->addTriangle(at(i, j), at(i + 1, j + 1), at(i + 1, j));
+        }
+    return mesh;
+}
+
+double flat(double, double) {
+    return 0.0;
+}
+
+double weightOf(const ShellBody& sheet) {
+    return 9.81 * sheet.shell().masses().sum();
+}
+
+Vec3 contactForce(const ShellBody& sheet, double h) {
+    Vec3 sum = Vec3::Zero();
+    for (const ContactImpulse& c : sheet.contacts()) sum += c.impulse / h;
+    return sum;
+}
+
+void place(ShellBody& sheet, const Vec3& by) {
+    std::vector<btVector3> x(sheet.positions().begin(), sheet.positions().end());
+    for (btVector3& p : x) p += btVector3(btScalar(by.x()), btScalar(by.y()), btScalar(by.z()));
+    sheet.setPositions(x);
+}
+
+/// The contact forces of some steps, so that a residual shake averages out, against the weight.
+void expectWeightIsBorne(BulletScene& scene, ShellBody& sheet, double tolerance) {
+    Vec3 mean = Vec3::Zero();
+    const int steps = 40;
+    for (int i = 0; i < steps; ++i) {
+        scene.step(kStep);
+        mean += contactForce(sheet, kStep) / steps;
+    }
+    EXPECT_LT((mean - Vec3(0, weightOf(sheet), 0)).norm(), tolerance * weightOf(sheet)) << mean.transpose();
+}
+
+double lowestClearance(const ShellBody& sheet, const std::function<double(double, double)>& height) {
+    double lowest = 1e9;
+    for (const auto& p : sheet.shell().positions().colwise()) lowest = std::min(lowest, p.y() - height(p.x(), p.z()));
+    return lowest;
+}
+
+// ------------------------------------------------------------------------------------------------------------ floors
+
+/// One surface, by every kind of shape that Bullet can make of it.
+struct Floor {
+    std::unique_ptr<btTriangleMesh> mesh;
+    std::unique_ptr<btBvhTriangleMeshShape> child;
+    std::vector<float> heights;
+    std::unique_ptr<btCollisionShape> shape;
+};
+
+using MakeFloor = void (*)(Floor&);
+
+void bvhFloor(Floor& floor) {
+    floor.mesh = surfaceMesh(2, 7, flat);
+    floor.shape = std::make_unique<btBvhTriangleMeshShape>(floor.mesh.get(), true);
+}
+void scaledFloor(Floor& floor) {
+    floor.mesh = surfaceMesh(2, 7, flat, 0.5);
+    floor.child = std::make_unique<btBvhTriangleMeshShape>(floor.mesh.get(), true);
+    floor.shape = std::make_unique<btScaledBvhTriangleMeshShape>(floor.child.get(), btVector3(0.5f, 3.0f, 0.5f));
+}
+void mirroredFloor(Floor& floor) {  // its triangles are wound the other way round
+    floor.mesh = surfaceMesh(2, 7, flat);
+    floor.child = std::make_unique<btBvhTriangleMeshShape>(floor.mesh.get(), true);
+    floor.shape = std::make_unique<btScaledBvhTriangleMeshShape>(floor.child.get(), btVector3(-1, 1, 1));
+}
+void multimaterialFloor(Floor& floor) {
+    floor.mesh = surfaceMesh(2, 7, flat);
+    floor.shape = std::make_unique<btMultimaterialTriangleMeshShape>(floor.mesh.get(), true);
+}
+void heightfieldFloor(Floor& floor) {
+    floor.heights.assign(21 * 21, 0.0f);
+    auto shape =
+        std::make_unique<btHeightfieldTerrainShape>(21, 21, floor.heights.data(), btScalar(-1), btScalar(1), 1, false);
+    shape->setLocalScaling(btVector3(btScalar(0.1), 1, btScalar(0.1)));
+    floor.shape = std::move(shape);
+}
+void gimpactFloor(Floor& floor) {
+    floor.mesh = surfaceMesh(2, 7, flat);
+    auto shape = std::make_unique<btGImpactMeshShape>(floor.mesh.get());
+    shape->updateBound();
+    floor.shape = std::move(shape);
+}
+void meshInACompound(Floor& floor) {
+    floor.mesh = surfaceMesh(2, 7, flat);
+    floor.child = std::make_unique<btBvhTriangleMeshShape>(floor.mesh.get(), true);
+    auto shape = std::make_unique<btCompoundShape>();
+    shape->addChildShape(btTransform(btQuaternion(btVector3(0, 1, 0), btScalar(0.3))), floor.child.get());
+    floor.shape = std::move(shape);
+}
+
+struct FloorKind {
+    const char* name;
+    MakeFloor make;
+};
+
+class Floors : public ::testing::TestWithParam<FloorKind> {};
+
+TEST_P(Floors, BearTheWeightOfASheet) {
+    Floor floor;
+    GetParam().make(floor);
+    BulletScene scene;
+    scene.addBody(std::move(floor.shape), 0, btVector3(0, 0, 0));
+    auto& sheet = scene.shells->add(squareSheet(1, 8), trampolineCloth());
+    place(sheet, {0.013, 0.01, 0.017});
+    scene.run(0.5, kStep);
+    const double lowest = lowestClearance(sheet, flat), thickness = sheet.contactThickness();
+    EXPECT_NEAR(lowest, thickness, bulletTolerance(6e-5, 7e-5));
+    expectWeightIsBorne(scene, sheet, 1e-3);
+    EXPECT_TRUE(scene.shells->takeWarnings().empty());
+}
+INSTANTIATE_TEST_SUITE_P(Kinds, Floors,
+                         ::testing::Values(FloorKind{"mesh", bvhFloor}, FloorKind{"scaled", scaledFloor},
+                                           FloorKind{"mirrored", mirroredFloor},
+                                           FloorKind{"multimaterial", multimaterialFloor},
+                                           FloorKind{"heightfield", heightfieldFloor},
+                                           FloorKind{"GImpact", gimpactFloor}, FloorKind{"child", meshInACompound}),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+/// Slides by 1 m/s over the edges between triangles as over a plane, with and without friction.
+TEST(TriangleMesh, AFlatFloorSlidesLikeAPlane) {
+    for (const double friction : {0.0, 0.2}) {
+        std::array<double, 2> speed{};
+        for (int k = 0; k < 2; ++k) {
+            BulletScene scene;
+            const auto mesh = surfaceMesh(4, 37, flat);
+            if (k == 0)
+                scene.addBody(std::make_unique<btStaticPlaneShape>(btVector3(0, 1, 0), btScalar(0)), 0,
+                              btVector3(0, 0, 0));
+            else
+                scene.addBody(std::make_unique<btBvhTriangleMeshShape>(mesh.get(), true), 0, btVector3(0, 0, 0));
+            scene.bodies[0]->setFriction(1);
+            auto& sheet = scene.shells->add(squareSheet(0.5, 8), trampolineCloth(), {.friction = friction});
+            place(sheet, {-0.7, sheet.contactThickness(), 0.1});
+            sheet.setVelocity(btVector3(1, 0, btScalar(0.2)));
+            scene.run(0.25, kStep);
+            speed[k] = double(sheet.linearMomentum().length()) / sheet.shell().masses().sum();
+            scene.shells.reset();
+            for (const auto& body : scene.bodies) scene.world.removeRigidBody(body.get());
+            scene.bodies.clear();
+        }
+        EXPECT_NEAR(speed[1], speed[0], 0.01 * speed[0]) << "friction " << friction;
+        EXPECT_NEAR(speed[0], std::hypot(1.0, 0.2) - friction * 9.81 * 0.25, 0.05);
+    }
+}
+
+/// Only the front pushes: what is far behind goes on falling, what stands a little behind is put back in front.
+TEST(TriangleMesh, IsOneSided) {
+    const auto mesh = surfaceMesh(4, 8, flat);
+    BulletScene scene;
+    scene.addBody(std::make_unique<btBvhTriangleMeshShape>(mesh.get(), true), 0, btVector3(0, 0, 0));
+    auto& below = scene.shells->add(squareSheet(0.5, 5), trampolineCloth());
+    auto& sunk = scene.shells->add(squareSheet(0.5, 5), trampolineCloth());
+    place(below, {-1, -0.3, 0});
+    place(sunk, {1, -0.01, 0});
+    scene.run(0.4, kStep);
+    EXPECT_NEAR(below.positions()[12].y(), -0.3 - 0.5 * 9.81 * 0.16, 0.05);
+    EXPECT_GT(lowestClearance(sunk, flat), -1e-4);
+}
+
+// ------------------------------------------------------------------------------------------------------ hills, valleys
+
+double hill(double x, double z) {
+    return 0.15 * std::exp(-(x * x + z * z) / 0.08);
+}
+
+TEST(Heightfield, AClothDrapesOverAHill) {
+    const int n = 41;
+    std::vector<float> heights(n * n);
+    for (int j = 0; j < n; ++j)
+        for (int i = 0; i < n; ++i) heights[j * n + i] = float(hill(0.04 * i - 0.8, 0.04 * j - 0.8));
+    auto shape = std::make_unique<btHeightfieldTerrainShape>(n, n, heights.data(), btScalar(-1), btScalar(1), 1, false);
+    shape->setLocalScaling(btVector3(btScalar(0.04), 1, btScalar(0.04)));
+    BulletScene scene;
+    scene.addBody(std::move(shape), 0, btVector3(0, 0, 0));
+    auto& sheet = scene.shells->add(squareSheet(0.8, 16), trampolineCloth());
+    place(sheet, {0.01, 0.17, 0.02});
+    // The surface between the grid's points, with the diagonal that Bullet draws: from (i, j + 1) to (i + 1, j).
+    const auto surface = [&](double x, double z) {
+        const double u = (x + 0.8) / 0.04, v = (z + 0.8) / 0.04;
+        const int i = std::clamp(int(u), 0, n - 2), j = std::clamp(int(v), 0, n - 2);
+        const double a = u - i, b = v - j;
+        const auto h = [&](int di, int dj) { return double(heights[(j + dj) * n + i + di]); };
+        return a + b <= 1 ? h(0, 0) + a * (h(1, 0) - h(0, 0)) + b * (h(0, 1) - h(0, 0))
+                          : h(1, 1) + (1 - a) * (h(0, 1) - h(1, 1)) + (1 - b) * (h(1, 0) - h(1, 1));
+    };
+    double lowest = 1e9;
+    for (int i = 0; i < 180; ++i) {
+        scene.step(kStep);
+        lowest = std::min(lowest, lowestClearance(sheet, surface));
+    }
+    EXPECT_GT(lowest, -1e-4);
+    EXPECT_LT(sheet.positions()[0].y(), 0.05);  // a corner has come down
+    EXPECT_EQ(scene.shells->lastStep().rejectedSteps, 0);
+}
+
+TEST(Heightfield, EditedInPlaceLiftsWhatLiesOnIt) {
+    std::vector<float> heights(21 * 21, 0.0f);
+    auto shape =
+        std::make_unique<btHeightfieldTerrainShape>(21, 21, heights.data(), btScalar(-1), btScalar(1), 1, false);
+    shape->setLocalScaling(btVector3(btScalar(0.1), 1, btScalar(0.1)));
+    BulletScene scene;
+    scene.addBody(std::move(shape), 0, btVector3(0, 0, 0));
+    auto& sheet = scene.shells->add(squareSheet(0.5, 5), trampolineCloth());
+    place(sheet, {0, 0.001, 0});
+    scene.run(0.2, kStep);
+    for (int i = 0; i < 60; ++i) {
+        for (float& height : heights) height += 1e-3f;
+        scene.step(kStep);
+    }
+    EXPECT_GT(lowestClearance(sheet, [](double, double) { return 0.06; }), -1e-4);
+    scene.run(0.5, kStep);
+    EXPECT_NEAR(lowestClearance(sheet, flat), 0.06 + sheet.contactThickness(), 1e-4);
+}
+
+/// The walls of a V stand at the given angle to each other.
+class Valley : public ::testing::TestWithParam<double> {};
+
+TEST_P(Valley, HoldsASheetWithoutLettingItSink) {
+    const double slope = 1.0 / std::tan(GetParam() / 2 * std::numbers::pi / 180);
+    const auto height = [&](double x, double) { return slope * std::abs(x); };
+    const auto mesh = surfaceMesh(2, 2, height);
+    BulletScene scene;
+    scene.addBody(std::make_unique<btBvhTriangleMeshShape>(mesh.get(), true), 0, btVector3(0, 0, 0));
+    auto& sheet = scene.shells->add(squareSheet(0.4, 8), trampolineCloth(), {.friction = 0.1});
+    place(sheet, {0.0, 0.21 * slope, 0.0});
+    double lowest = 1e9;
+    for (int i = 0; i < 240; ++i) {
+        scene.step(kStep);
+        lowest = std::min(lowest, lowestClearance(sheet, height));
+    }
+    EXPECT_GT(lowest, -1e-4);
+    EXPECT_LT(lowest, 0.01);
+    EXPECT_TRUE(scene.shells->lastStep().finite);
+    expectWeightIsBorne(scene, sheet, 0.02);  // cloth on smooth walls does not come quite to rest
+}
+INSTANTIATE_TEST_SUITE_P(Degrees, Valley, ::testing::Values(60.0, 90.0, 120.0, 150.0, 165.0));
+
+// -------------------------------------------------------------------------------------- parts smaller than a triangle
+
+/// A pyramid 5 cm high whose foot is 4 cm wide stands on a floor, below the middle of a triangle 20 cm wide: no vertex
+/// of the sheet comes near it.
+TEST(TriangleMesh, ASpikeHoldsATriangleThatIsLarger) {
+    btTriangleMesh mesh;
+    const btVector3 tip(0, btScalar(0.05), 0);
+    const btScalar half(0.02);
+    const btVector3 foot[] = {{-half, 0, -half}, {-half, 0, half}, {half, 0, half}, {half, 0, -half}};
+    for (int i = 0; i < 4; ++i) mesh.addTriangle(foot[i], foot[(i + 1) % 4], tip);
+    BulletScene scene;
+    scene.addBody(std::make_unique<btBvhTriangleMeshShape>(&mesh, true), 0, btVector3(0, 0, 0));
+    auto& sheet = scene.shells->add(squareSheet(0.6, 3), trampolineCloth());
+    place(sheet, {0.03, 0.0505, -0.04});
+    pinBorder(sheet);
+    for (const int corner : {0, 3, 12, 15}) sheet.unpin(corner);
+    scene.run(1.0, kStep);
+    // Somewhere in the triangle above the tip is a point at the tip's height.
+    const auto& x = sheet.shell().positions();
+    double above = -1;
+    for (int t = 0; t < sheet.triangles().cols(); ++t) {
+        const auto c = sheet.triangles().col(t);
+        const Vec3 a = x.col(c[0]), u = Vec3(x.col(c[1])) - a, v = Vec3(x.col(c[2])) - a;
+        Mat2 m;
+        m << u.x(), v.x(), u.z(), v.z();
+        const Vec2 w = m.inverse() * Vec2(-a.x(), -a.z());
+        if (w.minCoeff() >= 0 && w.sum() <= 1) above = (a + w.x() * u + w.y() * v).y();
+    }
+    EXPECT_NEAR(above, 0.05 + sheet.contactThickness(), 1e-3);
+    ASSERT_GE(sheet.contacts().size(), 1u);
+    EXPECT_GT(contactForce(sheet, kStep).y(), 0);
+}
+
+/// A roof's ridge along x, under a coarse sheet whose vertices are all beside it.
+TEST(TriangleMesh, ARidgeHoldsTheEdgesThatCrossIt) {
+    const auto roof = [](double x, double) { return 0.1 - std::abs(x); };
+    const auto mesh = surfaceMesh(2, 2, roof);
+    BulletScene scene;
+    scene.addBody(std::make_unique<btBvhTriangleMeshShape>(mesh.get(), true), 0, btVector3(0, 0, 0));
+    auto& sheet = scene.shells->add(squareSheet(0.6, 3), trampolineCloth());
+    place(sheet, {0.0, 0.11, 0.03});
+    double lowest = 1e9;
+    for (int i = 0; i < 60; ++i) {
+        scene.step(kStep);
+        for (const auto& e : sheet.shell().mesh().edges()) {
+            const Vec3 p = 0.5 * (sheet.shell().positions().col(e.v0) + sheet.shell().positions().col(e.v1));
+            lowest = std::min(lowest, p.y() - roof(p.x(), p.z()));
+        }
+    }
+    EXPECT_GT(lowest, -1e-3);
+    EXPECT_LT(lowest, 0.01);
+}
+
+// ---------------------------------------------------------------------------------------------------------- compounds
+
+TEST(Compound, OfBoxesBearsASheet) {
+    auto shape = std::make_unique<btCompoundShape>();
+    std::vector<std::unique_ptr<btBoxShape>> boxes;
+    for (int i = -1; i <= 1; ++i) {
+        boxes.push_back(std::make_unique<btBoxShape>(btVector3(btScalar(0.25), btScalar(0.1), 1)));
+        btTransform at = btTransform::getIdentity();
+        at.setOrigin(btVector3(btScalar(0.5 * i), btScalar(-0.1), 0));
+        shape->addChildShape(at, boxes.back().get());
+    }
+    BulletScene scene;
+    scene.addBody(std::move(shape), 0, btVector3(0, 0, 0));
+    auto& sheet = scene.shells->add(squareSheet(1, 9), trampolineCloth());
+    place(sheet, {0.013, 0.01, 0.017});
+    scene.run(0.5, kStep);
+    EXPECT_NEAR(lowestClearance(sheet, flat), sheet.contactThickness(), 1e-4);
+    expectWeightIsBorne(scene, sheet, 1e-3);
+}
+
+TEST(Compound, ChildrenComeAndGoWhileTheyTouch) {
+    btBoxShape box(btVector3(1, btScalar(0.1), 1)), block(btVector3(btScalar(0.2), btScalar(0.15), btScalar(0.2)));
+    auto shape = std::make_unique<btCompoundShape>();
+    btCompoundShape& compound = *shape;
+    btTransform at = btTransform::getIdentity();
+    at.setOrigin(btVector3(0, btScalar(-0.1), 0));
+    compound.addChildShape(at, &box);
+    BulletScene scene;
+    auto& body = scene.addBody(std::move(shape), 0, btVector3(0, 0, 0));
+    auto& sheet = scene.shells->add(squareSheet(0.5, 6), trampolineCloth());
+    place(sheet, {0, 0.2, 0});
+    at.setOrigin(btVector3(0, 0, 0));
+    compound.addChildShape(at, &block);
+    scene.world.updateSingleAabb(&body);
+    scene.run(0.4, kStep);
+    EXPECT_GT(sheet.positions()[24].y(), 0.149);  // on the block
+    compound.removeChildShape(&block);
+    scene.run(0.6, kStep);
+    EXPECT_LT(sheet.positions()[24].y(), 0.02);
+    EXPECT_GT(lowestClearance(sheet, flat), -1e-4);
+    const btScalar half(0.5);
+    box.setLocalScaling(btVector3(1, half, 1));  // its top is now 5 cm lower
+    scene.run(0.6, kStep);
+    EXPECT_NEAR(lowestClearance(sheet, flat), -0.05 + sheet.contactThickness(), 1e-3);
+}
+
+TEST(Compound, AnEmptyShapeIsNothing) {
+    BulletScene scene;
+    auto shape = std::make_unique<btCompoundShape>();
+    btEmptyShape empty;
+    btBoxShape box(btVector3(1, btScalar(0.1), 1));
+    shape->addChildShape(btTransform::getIdentity(), &box);
+    shape->addChildShape(btTransform::getIdentity(), &empty);
+    scene.addBody(std::move(shape), 0, btVector3(0, btScalar(-0.1), 0));
+    auto& sheet = scene.shells->add(squareSheet(0.5, 4), trampolineCloth());
+    place(sheet, {0, 0.01, 0});
+    scene.run(0.3, kStep);
+    EXPECT_GT(lowestClearance(sheet, flat), -1e-4);
+    EXPECT_TRUE(scene.shells->takeWarnings().empty());
+}
+
+/// Ball of a multi-sphere shape, and the same ball as a user's own shape.
+class UserBall final : public btConvexInternalShape {
+  public:
+    explicit UserBall(btScalar radius) : m_radius(radius) { m_shapeType = CUSTOM_CONVEX_SHAPE_TYPE; }
+    btVector3 localGetSupportingVertexWithoutMargin(const btVector3& v) const override {
+        return v * (m_radius / v.length());
+    }
+    void batchedUnitVectorGetSupportingVertexWithoutMargin(const btVector3* in, btVector3* out, int n) const override {
+        for (int i = 0; i < n; ++i) out[i] = localGetSupportingVertexWithoutMargin(in[i]);
+    }
+    void calculateLocalInertia(btScalar mass, btVector3& inertia) const override {
+        inertia.setValue(1, 1, 1);
+        inertia *= btScalar(0.4) * mass * m_radius * m_radius;
+    }
+    const char* getName() const override { return "UserBall"; }
+
+  private:
+    btScalar m_radius;
+};
+
+TEST(OtherConvexShapes, HangInASheetLikeABall) {
+    const btVector3 centre(0, 0, 0);
+    const btScalar radius(0.2);
+    std::vector<std::unique_ptr<btCollisionShape>> shapes;
+    shapes.push_back(std::make_unique<btSphereShape>(radius));
+    shapes.push_back(std::make_unique<btMultiSphereShape>(&centre, &radius, 1));
+    shapes.push_back(std::make_unique<UserBall>(radius));
+    std::vector<double> heights;
+    for (auto& shape : shapes) {
+        BulletScene scene;
+        auto& ball = scene.addBody(std::move(shape), 1.0, btVector3(0, btScalar(0.2), 0));
+        auto& sheet = scene.shells->add(squareSheet(1, 10), trampolineCloth());
+        pinBorder(sheet);
+        scene.run(0.5, kStep);
+        heights.push_back(double(ball.getWorldTransform().getOrigin().y()));
+        EXPECT_LT(penetration(sheet, toVec3(ball.getWorldTransform().getOrigin()), 0.2), 2e-3);
+    }
+    EXPECT_NEAR(heights[1], heights[0], 2e-3);
+    EXPECT_NEAR(heights[2], heights[0], 2e-3);
+}
+
+/// A GImpact mesh is the one concave shape that may move by forces: a tetrahedron lies in a sheet.
+TEST(GImpact, AMovingBodyIsCaughtByASheet) {
+    btTriangleMesh mesh;
+    const double r = 0.15;
+    const btVector3 corner[] = {
+        btVector3(btScalar(r), btScalar(r), btScalar(r)), btVector3(btScalar(r), btScalar(-r), btScalar(-r)),
+        btVector3(btScalar(-r), btScalar(r), btScalar(-r)), btVector3(btScalar(-r), btScalar(-r), btScalar(r))};
+    for (int i = 0; i < 4; ++i) {
+        btVector3 a = corner[(i + 1) % 4], b = corner[(i + 2) % 4], c = corner[(i + 3) % 4];
+        if ((b - a).cross(c - a).dot(a - corner[i]) < 0) std::swap(b, c);
+        mesh.addTriangle(a, b, c);
+    }
+    auto shape = std::make_unique<btGImpactMeshShape>(&mesh);
+    shape->updateBound();
+    BulletScene scene;
+    auto& body = scene.addBody(std::move(shape), 0.5, btVector3(0, btScalar(0.2), 0));
+    body.setDamping(btScalar(0.2), btScalar(0.5));
+    auto& sheet = scene.shells->add(squareSheet(1, 12), trampolineCloth());
+    pinBorder(sheet);
+    for (int i = 0; i < 240; ++i) {
+        scene.step(kStep);
+        ASSERT_GT(body.getWorldTransform().getOrigin().y(), -0.2) << "step " << i;
+        ASSERT_TRUE(scene.shells->lastStep().finite);
+    }
+    EXPECT_GT(sheet.contacts().size(), 0u);
+}
+
+}  // namespace
+}  // namespace jacket::bullet::testing
