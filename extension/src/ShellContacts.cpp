@@ -150,14 +150,20 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
         for (const SurfacePoint& s : touched)
             m_candidates.push_back({i, {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance}});
     }
-    for (int t = 0; query.wantsFaces() && t < mesh.triangleCount(); ++t) {
+    if (!query.wantsFaces()) return;
+    std::vector<TrianglePoint> faces;
+    for (int t = 0; t < mesh.triangleCount(); ++t) {
         Mat3 triangle;
-        for (int a = 0; a < 3; ++a) triangle.col(a) = x.col(mesh.triangles()(a, t));
-        auto touch = patch->touch(triangle, faceReach, depth);
-        if (!touch) continue;
-        touch->surface.point = piece.frame * touch->surface.point;
-        touch->surface.normal = piece.frame.linear() * touch->surface.normal;
-        addFace(query, t, *touch);
+        std::array<bool, 3> edges;
+        for (int a = 0; a < 3; ++a) {
+            triangle.col(a) = x.col(mesh.triangles()(a, t));
+            edges[a] = mesh.twin(3 * t + a) < 3 * t + a;  // the other triangle has the rest
+        }
+        faces.clear();
+        patch->touch(triangle, edges, faceReach, depth, faces);
+        for (const auto& [surface, weights] : faces)
+            addFace(query, t,
+                    {{piece.frame * surface.point, piece.frame.linear() * surface.normal, surface.distance}, weights});
     }
 }
 

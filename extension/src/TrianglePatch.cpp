@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "ClosedForms.h"
 
@@ -127,10 +128,11 @@ void TrianglePatch::connect() {
     m_edgesOf.resize(m_triangles.size());
     for (std::size_t k = 0; k < sides.size(); ++k) {
         const Side& s = sides[k];
+        const int opposite = m_triangles[s.face][s.corner];
         if (k == 0 || s.low != m_edges.back().a || s.high != m_edges.back().b)
-            m_edges.push_back({s.low, s.high, {s.face, -1}, Vec3::Zero(), false});
+            m_edges.push_back({s.low, s.high, {s.face, -1}, {opposite, opposite}, Vec3::Zero()});
         Edge& edge = m_edges.back();
-        if (edge.faces[0] != s.face) edge.faces[1] = s.face;
+        if (edge.faces[0] != s.face) edge.faces[1] = s.face, edge.opposite[1] = opposite;
         edge.normal += m_normals[s.face];
         m_edgesOf[s.face][s.corner] = int(m_edges.size()) - 1;
     }
@@ -145,22 +147,29 @@ void TrianglePatch::connect() {
     }
 }
 
+bool TrianglePatch::isRidge(const Edge& edge) const {
+    if (edge.faces[1] < 0) return true;
+    const Vec3 &a = m_corners[edge.a].point, &b = m_corners[edge.b].point, along = b - a;
+    const auto rises = [&](int side) {
+        const Vec3 across = m_corners[edge.opposite[side]].point - a;
+        const Vec3 inward = across - across.dot(along) / along.squaredNorm() * along;
+        return m_normals[edge.faces[1 - side]].dot(inward) / inward.norm();
+    };
+    return rises(0) < -kFlat && rises(1) < -kFlat;
+}
+
 void TrianglePatch::collectRidges() {
-    for (int t = 0; t < triangleCount(); ++t)
-        for (int i = 0; i < 3; ++i) {
-            Edge& edge = m_edges[m_edgesOf[t][i]];
-            const Vec3 along = m_corners[edge.b].point - m_corners[edge.a].point;
-            const Vec3 across = m_corners[m_triangles[t][i]].point - m_corners[edge.a].point;
-            const Vec3 inward = across - across.dot(along) / along.squaredNorm() * along;
-            const int other = edge.faces[0] == t ? edge.faces[1] : edge.faces[0];
-            if (other < 0 || m_normals[other].dot(inward) < -kFlat * inward.norm()) edge.isRidge = true;
-        }
     std::vector<Bounds> bounds;
-    for (int e = 0; e < int(m_edges.size()); ++e) {
-        const Edge& edge = m_edges[e];
-        if (!edge.isRidge) continue;
-        m_ridges.push_back(e);
+    std::vector<char> isTip(m_corners.size(), 0);
+    for (const Edge& edge : m_edges) {
+        if (!isRidge(edge)) continue;
         const Vec3 &a = m_corners[edge.a].point, &b = m_corners[edge.b].point;
+        Ridge ridge{a, b - a, edge.normal, {}, {-1, -1}};
+        for (int side = 0; side < 2; ++side)
+            ridge.inward[side] = (m_corners[edge.opposite[side]].point - a).normalized();
+        for (const int end : {edge.a, edge.b})
+            if (!std::exchange(isTip[end], 1)) ridge.tips[end == edge.b] = end;
+        m_ridges.push_back(ridge);
         bounds.push_back({a.cwiseMin(b), a.cwiseMax(b)});
     }
     m_ridgeTree = BoxTree(bounds);
@@ -188,7 +197,7 @@ TrianglePatch::Nearest TrianglePatch::classify(int face, const Vec3& p, const Ve
         const Edge& edge = m_edges[m_edgesOf[face][opposite]];
         normal = edge.normal;
         isBorder = edge.faces[1] < 0;
-        if (!edge.isRidge && !isBorder && m_normals[edge.faces[0]].dot(m_normals[edge.faces[1]]) > 1 - kFlat * kFlat)
+        if (!isBorder && m_normals[edge.faces[0]].dot(m_normals[edge.faces[1]]) > 1 - kFlat * kFlat)
             normal = m_normals[face];
     }
     const Vec3 offset = p - point;
@@ -272,58 +281,56 @@ bool TrianglePatch::isInside(const Vec3& p, double depth) const {
     return found && found->isBehind;
 }
 
-std::optional<TrianglePoint> TrianglePatch::touchTip(int index, const Mat3& triangle) const {
+std::optional<TrianglePoint> TrianglePatch::touchTip(int index, const FaceQuery& query) const {
     const Corner& tip = m_corners[index];
-    const Barycentric b = closestOnTriangle(tip.point, triangle);
-    if (!(b.weights.minCoeff() > 0)) return std::nullopt;  // a ridge and an edge say it
-    Vec3 n = triangleNormal(triangle);
-    if (n.dot(tip.normal) < 0) n = -n;
+    const Vec3 n = query.normal.dot(tip.normal) < 0 ? -query.normal : query.normal;
+    if (!query.isNear(n.dot(query.triangle.col(0) - tip.point))) return std::nullopt;
     for (const int e : tip.edges) {
         const Vec3 away = m_corners[m_edges[e].a == index ? m_edges[e].b : m_edges[e].a].point - tip.point;
         if (n.dot(away) > kCone * away.norm()) return std::nullopt;
     }
+    const Barycentric b = closestOnTriangle(tip.point, query.triangle);
+    if (!(b.weights.minCoeff() > 0)) return std::nullopt;  // a ridge and an edge say it
     return TrianglePoint{{tip.point, n, n.dot(b.point - tip.point)}, b.weights};
 }
 
-std::optional<TrianglePoint> TrianglePatch::touchRidge(const Edge& ridge, const Mat3& triangle, int side) const {
+std::optional<TrianglePoint> TrianglePatch::touchRidge(const Ridge& ridge, const FaceQuery& query, int side) const {
     const int next = (side + 1) % 3;
-    const Vec3 &a = m_corners[ridge.a].point, &b = m_corners[ridge.b].point;
-    const Vec3 along = triangle.col(next) - triangle.col(side), across = along.cross(b - a);
-    if (!(across.norm() > kParallel * along.norm() * (b - a).norm())) return std::nullopt;
-    const auto [s, t] = closestOfSegments(triangle.col(side), triangle.col(next), a, b);
+    const Vec3 start = query.triangle.col(side), along = query.triangle.col(next) - start;
+    Vec3 n = along.cross(ridge.along);
+    const double length = std::copysign(n.norm(), n.dot(ridge.normal));
+    if (!(std::abs(length) > kParallel * along.norm() * ridge.along.norm())) return std::nullopt;
+    n /= length;
+    if (n.dot(ridge.inward[0]) > kCone || n.dot(ridge.inward[1]) > kCone) return std::nullopt;
+    const double distance = n.dot(start - ridge.start);  // of the two lines
+    if (!query.isNear(distance)) return std::nullopt;
+    const auto [s, t] = closestOfSegments(start, start + along, ridge.start, ridge.start + ridge.along);
     if (!(s > 1e-9 && s < 1 - 1e-9 && t > 1e-9 && t < 1 - 1e-9)) return std::nullopt;
-    Vec3 n = across.normalized();
-    if (n.dot(ridge.normal) < 0) n = -n;
-    for (const int face : ridge.faces) {
-        if (face < 0) continue;
-        for (const int corner : m_triangles[face]) {
-            const Vec3 away = m_corners[corner].point - a;
-            if (n.dot(away) > kCone * away.norm()) return std::nullopt;
-        }
-    }
     Vec3 weights = Vec3::Zero();
     weights[side] = 1 - s;
     weights[next] = s;
-    const Vec3 point = a + t * (b - a);
-    return TrianglePoint{{point, n, n.dot(triangle * weights - point)}, weights};
+    return TrianglePoint{{ridge.start + t * ridge.along, n, distance}, weights};
 }
 
-std::optional<TrianglePoint> TrianglePatch::touch(const Mat3& triangle, double reach, double depth) const {
-    std::optional<TrianglePoint> deepest;
-    const auto offer = [&](const std::optional<TrianglePoint>& t) {
-        if (!t || t->surface.distance > reach || t->surface.distance < -depth) return;
-        if (deepest && t->surface.distance >= deepest->surface.distance) return;
-        if (t->surface.distance < 0 && !isInside(triangle * t->weights, depth)) return;
-        deepest = t;
+void TrianglePatch::touch(const Mat3& triangle, const std::array<bool, 3>& edges, double reach, double depth,
+                          std::vector<TrianglePoint>& touched) const {
+    const FaceQuery query{triangle, triangleNormal(triangle), reach, depth};
+    std::array<std::optional<TrianglePoint>, 4> deepest;  // of the edges, of the inside
+    const auto offer = [&](int place, const std::optional<TrianglePoint>& t) {
+        if (!t || (deepest[place] && t->surface.distance >= deepest[place]->surface.distance)) return;
+        if (t->surface.distance >= 0 || isInside(triangle * t->weights, depth)) deepest[place] = t;
     };
     const Bounds near = grown(boundsOf(triangle), std::max(reach, depth));
     m_ridgeTree.visit([&](const Bounds& bounds) { return bounds.overlaps(near); },
                       [&](int index) {
-                          const Edge& ridge = m_edges[m_ridges[index]];
-                          for (int side = 0; side < 3; ++side) offer(touchRidge(ridge, triangle, side));
-                          for (const int end : {ridge.a, ridge.b}) offer(touchTip(end, triangle));
+                          const Ridge& ridge = m_ridges[index];
+                          for (int side = 0; side < 3; ++side)
+                              if (edges[side]) offer(side, touchRidge(ridge, query, side));
+                          for (const int tip : ridge.tips)
+                              if (tip >= 0) offer(3, touchTip(tip, query));
                       });
-    return deepest;
+    for (const auto& t : deepest)
+        if (t) touched.push_back(*t);
 }
 
 }  // namespace jacket::bullet

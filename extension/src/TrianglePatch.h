@@ -30,16 +30,25 @@ class TrianglePatch {
     /// valley. A point behind a valley's bottom gets every side of it.
     void touch(const Vec3& p, double reach, double depth, std::vector<SurfacePoint>& touched) const;
 
-    /// Where a corner of the surface meets the inside of a triangle, or a ridge one of its edges: the deepest such
-    /// place, at most `reach` apart or `depth` deep. The triangle's own corners are left to touch() of points.
-    std::optional<TrianglePoint> touch(const Mat3& triangle, double reach, double depth) const;
+    /// Appends where a corner of the surface meets the inside of a triangle, and where ridges meet its edges: the
+    /// deepest such place of the inside and of each edge, at most `reach` apart or `depth` deep. Only edges (from
+    /// corner i to the next) with a true entry in `edges` are looked at, for two triangles share each. The triangle's
+    /// own corners are left to touch() of points.
+    void touch(const Mat3& triangle, const std::array<bool, 3>& edges, double reach, double depth,
+               std::vector<TrianglePoint>& touched) const;
 
   private:
     struct Edge {
-        int a, b;                  // corners
-        std::array<int, 2> faces;  // the second is -1 at a border
-        Vec3 normal;               // mean of its faces', unit
-        bool isRidge;              // convex or a border: something can hang on it
+        int a, b;                     // corners
+        std::array<int, 2> faces;     // the second is -1 at a border
+        std::array<int, 2> opposite;  // their third corners, twice the same at a border
+        Vec3 normal;                  // mean of its faces', unit
+    };
+    /// A convex edge, or a border: something can hang on it.
+    struct Ridge {
+        Vec3 start, along, normal;
+        std::array<Vec3, 2> inward;  // from its start to the third corners of its faces, unit
+        std::array<int, 2> tips;     // the ends that no ridge before it has; -1
     };
     struct Corner {
         Vec3 point;
@@ -58,13 +67,20 @@ class TrianglePatch {
     void weld(const std::vector<Mat3>& triangles);
     void connect();
     void collectRidges();
+    bool isRidge(const Edge& edge) const;
     Mat3 triangle(int face) const;
     Nearest classify(int face, const Vec3& p, const Vec3& weights, const Vec3& point) const;
     std::optional<Nearest> nearest(const Vec3& p, double radius) const;
     void pushOut(const Nearest& nearest, const Vec3& p, std::vector<SurfacePoint>& touched) const;
     bool isInside(const Vec3& p, double depth) const;
-    std::optional<TrianglePoint> touchTip(int corner, const Mat3& triangle) const;
-    std::optional<TrianglePoint> touchRidge(const Edge& ridge, const Mat3& triangle, int side) const;
+    struct FaceQuery {
+        const Mat3& triangle;
+        Vec3 normal;
+        double reach, depth;
+        bool isNear(double distance) const { return distance <= reach && distance >= -depth; }
+    };
+    std::optional<TrianglePoint> touchTip(int corner, const FaceQuery& query) const;
+    std::optional<TrianglePoint> touchRidge(const Ridge& ridge, const FaceQuery& query, int side) const;
 
     Bounds m_box;
     std::vector<Corner> m_corners;
@@ -72,7 +88,7 @@ class TrianglePatch {
     std::vector<Vec3> m_normals;                // of the triangles
     std::vector<std::array<int, 3>> m_edgesOf;  // of the triangles: edge i is opposite to corner i
     std::vector<Edge> m_edges;
-    std::vector<int> m_ridges;
+    std::vector<Ridge> m_ridges;
     BoxTree m_tree, m_ridgeTree;
 };
 

@@ -670,7 +670,7 @@ TEST(ConvexPieces, NestedCompoundsAreFlattened) {
     std::vector<std::string> unsupported;
     const Pieces pieces = makeConvexPieces(outer, unsupported);
     ASSERT_EQ(pieces.size(), 2u);
-    EXPECT_EQ(unsupported, std::vector<std::string>{"Empty"});
+    EXPECT_TRUE(unsupported.empty());
     const auto s = pieces[0]->touch(Vec3(3, 3, 0), 5);  // the ball's centre is at (3, 0, 0)
     ASSERT_TRUE(s);
     EXPECT_NEAR(s->distance, 2, 1e-6);

@@ -176,7 +176,7 @@ TEST(ShellWorld, ZeroStepIsNoStep) {
 
 TEST(ShellWorld, WarnsOnceOfAShapeItCannotTouch) {
     BulletScene scene;
-    // Bullet's softbody shape has neither a support function nor triangles of its own; so has this one.
+    // Neither convex nor a list of triangles.
     struct Blob final : btCollisionShape {
         Blob() { m_shapeType = HFFLUID_SHAPE_PROXYTYPE; }
         void getAabb(const btTransform& t, btVector3& lower, btVector3& upper) const override {

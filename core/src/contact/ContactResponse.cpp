@@ -43,7 +43,7 @@ ContactResponse::Key ContactResponse::keyOf(const Contact& c) const {
     const HalfEdgeMesh& mesh = shell.mesh();
     int feature = c.feature, corner = 0;
     const int firstTriangle = Feature::triangle(0, mesh.vertexCount(), static_cast<int>(mesh.edges().size()));
-    if (feature >= firstTriangle && c.weights.minCoeff(&corner) < kNearEdge)
+    if (!c.isVertex() && feature >= firstTriangle && c.weights.minCoeff(&corner) < kNearEdge)
         feature = Feature::edge(mesh.edgeOf(3 * (feature - firstTriangle) + (corner + 1) % 3), mesh.vertexCount());
     return {&shell, m_input.bodies[c.body].key, feature};
 }
