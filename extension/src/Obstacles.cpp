@@ -117,7 +117,8 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, btDispatcher& disp
         coupled.freeTwist = moves && !hasMoved ? freeTwistOf(*rigid, h) : twistOf(*rigid);
         if (hasMoved) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
         coupled.position = obstacle.start.translation();
-        if (moves && !hasMoved && m_gravityIsNoForce) coupled.freeTwist.head<3>() += h * fromBullet(rigid->getGravity());
+        if (moves && !hasMoved && m_gravityIsNoForce)
+            coupled.freeTwist.head<3>() += h * fromBullet(rigid->getGravity());
         if (moves) coupled.mass = massOf(*rigid);
         if (moves && !hasMoved) addSupports(dispatcher, *rigid, coupled);
     }

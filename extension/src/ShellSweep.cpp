@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "BoxTree.h"
 #include "ShellContacts.h"
 
 namespace jacket::bullet {
@@ -9,14 +10,6 @@ namespace {
 constexpr int kMostAdvances = 60;  // of one triangle towards one piece; then the contact is taken where it is
 constexpr double kTouching = 0.3;  // of the contact thickness: closer than this they touch
 constexpr double kShallow = 0.5;   // of the body: what goes in less than that is found at the end of the step
-
-struct Bounds {
-    Vec3 lower = Vec3::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
-    void add(const Vec3& p) { lower = lower.cwiseMin(p), upper = upper.cwiseMax(p); }
-    bool overlaps(const Bounds& o) const {
-        return (lower.array() <= o.upper.array()).all() && (upper.array() >= o.lower.array()).all();
-    }
-};
 
 }  // namespace
 
@@ -30,18 +23,15 @@ struct ShellContacts::Sweep {
     double time;
 
     Bounds boundsOfBody() const {
-        Bounds bounds;
-        const double radius = obstacle.body.radius + shell.contactThickness();
-        for (const double t : {0.0, time}) {
-            const Vec3 centre = moved(obstacle.start, twist, t).translation();
-            bounds.add(centre - Vec3::Constant(radius));
-            bounds.add(centre + Vec3::Constant(radius));
-        }
-        return bounds;
+        const Vec3 radius = Vec3::Constant(obstacle.body.radius + shell.contactThickness());
+        const Vec3 first = moved(obstacle.start, twist, 0.0).translation(),
+                   last = moved(obstacle.start, twist, time).translation();
+        return {first.cwiseMin(last) - radius, first.cwiseMax(last) + radius};
     }
     Bounds boundsOfTriangle(const std::array<int, 3>& corners) const {
-        Bounds bounds;
-        for (const int i : corners) bounds.add(start.col(i)), bounds.add(end.col(i));
+        Bounds bounds{start.col(corners[0]), start.col(corners[0])};
+        for (const int i : corners)
+            for (const Vec3& p : {Vec3(start.col(i)), Vec3(end.col(i))}) bounds.include({p, p});
         return bounds;
     }
     Mat3 triangleAt(const std::array<int, 3>& corners, double t) const {
