@@ -42,6 +42,7 @@ struct IslandSolver::Impl {
     Points unfiltered;               ///< (b - A v) at the solution, soft rows included
     CoupledVector u, reference;
     Eigen::Matrix<double, 6, Eigen::Dynamic> freeTwist;
+    double impulseShare = 1.0;  ///< of the solved contacts that a step cut short takes: see limitDeformation
 
     void gather(const IslandInput& input);
     void beginTwoStep(const IslandInput& input, std::size_t shell);
@@ -49,6 +50,9 @@ struct IslandSolver::Impl {
     bool overstretches(const IslandInput& input) const;
     double energyGain(const IslandInput& input) const;
     void limitDeformation(const IslandInput& input, StepReport& report);
+    void blend(const IslandInput& input, const Points& other);
+    Points rigidMotion(const IslandInput& input, const Points& velocities) const;
+    Eigen::Matrix<double, 6, Eigen::Dynamic> endTwists() const;
     bool improves(const IslandInput& input, const Points& before);
     double incrementalPotential(const IslandInput& input, const Points& velocities) const;
     void solveStep(const IslandInput& input, StepReport& report);
@@ -68,6 +72,7 @@ StepReport IslandSolver::solve(const IslandInput& input) {
         throw std::invalid_argument("IslandInput.h [s] must be > 0 and finite");
     Impl& s = *m_impl;
     StepReport report;
+    s.impulseShare = 1.0;
     s.gather(input);                                                                  // one numbering for all shells
     s.response.begin(input, {s.offsets, s.dynamicIndex, s.stepOf}, s.expected, s.y);  // contacts at the start, y
     s.solveStep(input, report);                           // A, b; filtered PCG until the contacts agree
@@ -75,7 +80,7 @@ StepReport IslandSolver::solve(const IslandInput& input) {
         report.finite = report.converged = false;
         return report;
     }
-    report.passed = s.response.passes({s.v, s.u.w, s.unfiltered}, s.y);
+    report.passed = s.response.passes({s.v, s.endTwists(), s.unfiltered}, s.y);
     s.store(input, report);  // velocities, twists, reactions
     return report;
 }
@@ -217,17 +222,39 @@ bool IslandSolver::Impl::overstretches(const IslandInput& input) const {
 
 /// Where Newton's method does not settle, as in a stiff shell pinched between bodies, the step would throw the shell
 /// about. Its linear and angular momentum are kept then, and of the motion besides that only as much as gains no
-/// energy: it stands stiff for a step. Contacts may give way by that much, until the next step, and a fast body may
-/// pass.
+/// energy: it stands stiff for a step. If that still gains energy, contacts give only a share of what was solved, to
+/// shells and bodies alike. They may give way by that much until the next step, and a fast body may pass.
 void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& report) {
     constexpr int kMostHalvings = 40;
     report.limited = true;
-    Points rigid = Points::Zero(3, v.cols());
+    const Points rigid = rigidMotion(input, v);
+    for (int halving = 0; halving < kMostHalvings && energyGain(input) > kEnergyGain; ++halving) blend(input, rigid);
+    Points coasting = start;
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        coasting.middleCols(offsets[k], input.shells[k]->vertexCount()).colwise() += (input.h * input.gravity).eval();
+    coasting = rigidMotion(input, coasting);
+    for (int halving = 0; halving < kMostHalvings && energyGain(input) > kEnergyGain; ++halving) {
+        blend(input, coasting);
+        impulseShare *= 0.5;
+    }
+}
+
+/// Half way from the solved velocities to others, where vertices are free.
+void IslandSolver::Impl::blend(const IslandInput& input, const Points& other) {
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        for (int i = 0; i < input.shells[k]->vertexCount(); ++i)
+            if (!input.shells[k]->isPinned(i))
+                v.col(offsets[k] + i) = 0.5 * (v.col(offsets[k] + i) + other.col(offsets[k] + i));
+}
+
+/// The rigid motion of each shell with the momentum of these velocities; none of shells that are held.
+Points IslandSolver::Impl::rigidMotion(const IslandInput& input, const Points& velocities) const {
+    Points rigid = Points::Zero(3, velocities.cols());
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
-        if (shell.pinCount() > 0) continue;  // held: no motion as a whole
+        if (shell.pinCount() > 0) continue;
         const Eigen::VectorXd& mass = shell.masses();
-        const auto part = v.middleCols(offsets[k], shell.vertexCount());
+        const auto part = velocities.middleCols(offsets[k], shell.vertexCount());
         const Vec3 centre = shell.positions() * mass / mass.sum(), mean = part * mass / mass.sum();
         Mat3 inertia = Mat3::Zero();
         Vec3 spin = Vec3::Zero();
@@ -240,13 +267,12 @@ void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& 
         for (int i = 0; i < shell.vertexCount(); ++i)
             rigid.col(offsets[k] + i) = mean + omega.cross(Vec3(shell.positions().col(i) - centre));
     }
-    for (int halving = 0; halving < kMostHalvings && energyGain(input) > kEnergyGain; ++halving)
-        for (std::size_t k = 0; k < input.shells.size(); ++k)
-            for (int i = 0; i < input.shells[k]->vertexCount(); ++i)
-                if (!input.shells[k]->isPinned(i))
-                    v.col(offsets[k] + i) = 0.5 * (v.col(offsets[k] + i) + rigid.col(offsets[k] + i));
-    for (int halving = 0; halving < kMostHalvings && energyGain(input) > kEnergyGain; ++halving)
-        u.w = 0.5 * (u.w + freeTwist);  // a body too fast for all that: it gets as much as it can without gaining
+    return rigid;
+}
+
+/// Twists of the dynamic bodies at the end of the step.
+Eigen::Matrix<double, 6, Eigen::Dynamic> IslandSolver::Impl::endTwists() const {
+    return freeTwist + impulseShare * (u.w - freeTwist);
 }
 
 /// What shells and bodies gain in the solved step besides what gravity, forces and moved supports do, over the energy
@@ -273,11 +299,12 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
     }
     Eigen::Matrix<double, 6, Eigen::Dynamic> freeMomentum, momentum;
     system.momentum(freeTwist, freeMomentum);
-    system.momentum(u.w, momentum);
+    const Eigen::Matrix<double, 6, Eigen::Dynamic> twists = endTwists();
+    system.momentum(twists, momentum);
     for (std::size_t b = 0; b < dynamicBodies.size(); ++b) {
         const double kinetic = 0.5 * freeTwist.col(b).dot(freeMomentum.col(b));
         atStart += kinetic;
-        gain += 0.5 * u.w.col(b).dot(momentum.col(b)) - kinetic;
+        gain += 0.5 * twists.col(b).dot(momentum.col(b)) - kinetic;
     }
     for (const auto& held : system.constraints())  // work of pins and bodies that are moved
         if (held.body < 0) gain -= std::max(0.0, -unfiltered.col(held.vertex).dot(held.carried));
@@ -367,10 +394,12 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
 void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
     response.finish(report.contacts);
     Eigen::Matrix<double, 6, Eigen::Dynamic> change;
-    system.momentum(u.w - freeTwist, change);
+    const Eigen::Matrix<double, 6, Eigen::Dynamic> twists = endTwists();
+    system.momentum(twists - freeTwist, change);
+    for (ContactImpulse& contact : report.contacts) contact.impulse *= impulseShare;
     for (std::size_t b = 0; b < input.bodies.size(); ++b) {
         CoupledBody& body = input.bodies[b];
-        body.twist = body.prescribed ? body.freeTwist : Vec6(u.w.col(dynamicIndex[b]));
+        body.twist = body.prescribed ? body.freeTwist : Vec6(twists.col(dynamicIndex[b]));
         // The solved change of momentum, not the sum of the contacts' impulses: a light body would feel their residual.
         body.impulse = body.prescribed ? Vec6::Zero() : Vec6(change.col(dynamicIndex[b]));
     }
@@ -395,23 +424,25 @@ void IslandSolver::Impl::balance(const IslandInput& input, std::vector<ContactIm
     const auto count = input.bodies.size();
     std::vector<Vec6> onBodies(count, Vec6::Zero());
     std::vector<double> pressed(count, 0.0);
-    for (const auto& [contact, impulse, sticks] : impulses) {
+    for (const auto& [contact, impulse, sticks, slip] : impulses) {
         onBodies[contact.body] -= pointImpulse(impulse, contactArm(input, contact));
         pressed[contact.body] += impulse.norm();
     }
     std::vector<Vec3> onShells(input.shells.size(), Vec3::Zero());
     for (const auto& anchor : input.anchors) {
-        const Vec3 impulse = -unfiltered.col(offsets[anchor.shell] + anchor.vertex);
+        const Vec3 impulse = -impulseShare * unfiltered.col(offsets[anchor.shell] + anchor.vertex);
         onBodies[anchor.body] -= pointImpulse(impulse, anchor.point - input.bodies[anchor.body].position);
         onShells[anchor.shell] += impulse;
     }
     for (std::size_t b = 0; b < count; ++b)
         if (input.bodies[b].prescribed || !(pressed[b] > 0.0)) input.bodies[b].impulse = onBodies[b];
-    for (auto& [contact, impulse, sticks] : impulses) {
+    for (auto& [contact, impulse, sticks, slip] : impulses) {
         const Vec3 missing = input.bodies[contact.body].impulse.head<3>() - onBodies[contact.body].head<3>();
         impulse -= missing * (impulse.norm() / pressed[contact.body]);
         onShells[contact.shell] += impulse;
     }
+    Points solvedV;  // `v` may have been cut short since
+    system.velocities(u, solvedV);
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         if (shell.pinCount() > 0) continue;
@@ -419,9 +450,9 @@ void IslandSolver::Impl::balance(const IslandInput& input, std::vector<ContactIm
         Vec3 solved = -unfiltered.middleCols(offsets[k], shell.vertexCount()).rowwise().sum();
         for (const auto& row : system.rows())
             if (row.vertices[0] >= offsets[k] && row.vertices[0] < offsets[k] + shell.vertexCount())
-                solved += system.rowImpulse(row, v, u.w);
+                solved += system.rowImpulse(row, solvedV, u.w);
         const double mass = shell.masses().sum() * (1.0 + input.h * shell.material().massDamping);
-        vk.colwise() += ((onShells[k] - solved) / mass).eval();
+        vk.colwise() += ((onShells[k] - impulseShare * solved) / mass).eval();
     }
 }
 

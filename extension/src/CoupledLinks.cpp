@@ -103,6 +103,7 @@ VectorXd pointRow(const ArticulatedBody& body, const btCollisionObject* object, 
 void addContacts(btDispatcher& dispatcher, FreeMotion& motion) {
     for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
         const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(m);
+        if (!manifold.getBody0()->hasContactResponse() || !manifold.getBody1()->hasContactResponse()) continue;
         for (int k = 0; k < manifold.getNumContacts(); ++k) {
             const btManifoldPoint& point = manifold.getContactPoint(k);
             if (!(point.m_appliedImpulse > btScalar(0))) continue;

@@ -3,6 +3,7 @@
 #include <BulletCollision/CollisionShapes/btCollisionShape.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
+#include <LinearMath/btTransformUtil.h>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -14,6 +15,9 @@
 namespace jacket::bullet {
 namespace {
 
+// A body that its user moves faster than this and farther than so many times its size in a step has been teleported.
+constexpr double kTeleport = 50.0;  // [m/s]
+constexpr double kTeleportRadii = 4.0;
 // A direction in which Bullet does not let a body move takes part with this many times its mass.
 constexpr double kLocked = 1e8;
 // Along a rigid contact that bore load in the last solve, a body is this many times heavier than it is.
@@ -109,10 +113,12 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, btDispatcher& disp
         coupled.freeTwist = twistOf(*link);
         coupled.prescribed = isPrescribed(*link);
         if (hasMoved) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
-    } else if (!rigid || object.isStaticObject()) {
+    } else if (!rigid || object.isStaticOrKinematicObject()) {
         coupled.prescribed = true;
+        coupled.freeTwist = prescribedTwist(object, h, coupled.radius);
+        if (hasMoved) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
     } else {
-        const bool moves = !object.isKinematicObject() && rigid->isActive() && rigid->getInvMass() != btScalar(0);
+        const bool moves = rigid->isActive() && rigid->getInvMass() != btScalar(0);
         coupled.prescribed = !moves;
         coupled.freeTwist = moves && !hasMoved ? freeTwistOf(*rigid, h) : twistOf(*rigid);
         if (hasMoved) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
@@ -124,6 +130,25 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, btDispatcher& disp
     }
     coupled.position = obstacle.start.translation();
     return obstacle;
+}
+
+/// Of a body that its user moves. Bullet's velocity, where it took one from the same poses, is the mean over all
+/// substeps; else the last step's own motion. A jump is no motion.
+Vec6 Obstacles::prescribedTwist(const btCollisionObject& object, double h, double radius) {
+    const btTransform& now = object.getWorldTransform();
+    const auto [entry, fresh] = m_poses.try_emplace(&object, Pose{m_step, now, now});
+    Pose& pose = entry->second;
+    if (!fresh && pose.step != m_step) pose = {m_step, now, pose.step == m_step - 1 ? pose.now : now};
+    Vec6 twist = Vec6::Zero();
+    const btRigidBody* rigid = btRigidBody::upcast(&object);
+    if (rigid && object.isKinematicObject() && object.isActive()) twist = twistOf(*rigid);
+    if (twist.isZero(0.0)) {
+        btVector3 velocity, spin;
+        btTransformUtil::calculateVelocity(pose.before, pose.now, btScalar(h), velocity, spin);
+        twist << fromBullet(velocity), fromBullet(spin);
+    }
+    const double most = std::max(kTeleport, kTeleportRadii * radius / h);
+    return twist.head<3>().norm() < most && twist.allFinite() ? twist : Vec6(Vec6::Zero());
 }
 
 bool Obstacles::isUsable(const btCollisionObject& object) {

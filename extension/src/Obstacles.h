@@ -40,6 +40,8 @@ class Obstacles {
     Obstacle make(btCollisionObject& object, double h, btDispatcher& dispatcher, bool hasMoved);
     /// Shapes without any piece that shells can touch are reported here once, by Bullet's name of the shape.
     std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }
+    /// Before anything else in a step: what moves without Bullet's doing is known by its poses at two steps.
+    void beginStep() { ++m_step; }
     /// False for bodies that no solve could take, see defectOf; warns once of each.
     bool isUsable(const btCollisionObject& object);
     /// Whether the world adds gravity to velocities itself instead of leaving it in the bodies' total force.
@@ -51,6 +53,13 @@ class Obstacles {
     std::vector<std::string> m_warnings;
     std::vector<std::string> m_warnedNames;
     std::vector<const btCollisionObject*> m_warnedBodies;
+    struct Pose {
+        long step;
+        btTransform now, before;
+    };
+    Vec6 prescribedTwist(const btCollisionObject& object, double h, double radius);
+    std::unordered_map<const btCollisionObject*, Pose> m_poses;  ///< of static and kinematic objects
+    long m_step = 0;
     bool m_gravityIsNoForce = false;
 };
 

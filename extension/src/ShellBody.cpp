@@ -159,6 +159,16 @@ void ShellBody::setVelocity(const btVector3& velocity) {
     m_hasVelocity = false;
 }
 
+void ShellBody::note(const BodyContact& contact) {
+    m_contacts.push_back(contact);
+    m_exchanged -= contact.impulse;
+    m_frictionLoss -= contact.impulse.dot(contact.slip);
+}
+
+ShellLedger ShellBody::ledger() const {
+    return {m_shell.energy(), m_frictionLoss, fromBullet(linearMomentum()), m_exchanged};
+}
+
 btVector3 ShellBody::linearMomentum() const {
     return toBullet(Vec3(m_shell.linearMomentum() - m_pendingGravity * m_shell.masses().sum()));
 }

@@ -162,6 +162,7 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     report.unconvergedSteps = m_report.unconvergedSteps;
     report.passedSteps = m_report.passedSteps;
     m_report = report;
+    m_impl->obstacles.beginStep();
     releaseAnchors(*world);
     followGravity(double(h));
     std::vector<ShellBody*> all;
@@ -279,7 +280,7 @@ void ShellWorld::accept(Island& island, const StepReport& report, const std::vec
     if (!report.finite) return;
     for (const ContactImpulse& impulse : report.contacts) {
         ShellBody& shell = *island.shells[impulse.contact.shell];
-        shell.m_contacts.push_back(shell.describe(impulse, *island.obstacles[impulse.contact.body].object));
+        shell.note(shell.describe(impulse, *island.obstacles[impulse.contact.body].object));
         if (impulse.contact.isVertex())
             carry(shell, impulse.contact.vertices[0], island, impulse.contact.body, coupled, nullptr);
     }

@@ -56,6 +56,7 @@ struct ContactImpulse {
     Contact contact;
     Vec3 impulse{0, 0, 0};  ///< [N s]
     bool sticks = false;    ///< friction held it
+    Vec3 slip{0, 0, 0};     ///< how the shell slides over the body [m/s]
 };
 
 /// Feature ids: vertices, then edges, then triangles of the half-edge mesh.

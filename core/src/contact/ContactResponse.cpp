@@ -424,7 +424,7 @@ bool ContactResponse::update(const CoupledSystem& system, const IslandVelocities
     // Where everything ends is worth looking at only when no contact pulls: before, velocities can be anything.
     const bool entered = !released && checkEnd(solved, y, round);
     // Friction follows the normal impulses only when these have settled: lagged behind a passing one it runs away.
-    const bool slid = !released && !entered && updateFriction(system, solved);
+    const bool slid = !released && !entered && updateFriction(system);
     return (released || entered || slid) && round + 1 < kMaxRounds;
 }
 
@@ -432,6 +432,7 @@ void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelo
     for (Touch& touch : m_touches) {
         touch.impulse.setZero();
         touch.normalImpulse = 0.0;
+        if (touch.active) touch.slide = tangential(touch.contact.normal) * relativeVelocity(touch, solved);
         if (!touch.isRow) continue;
         const Vec3 u = relativeVelocity(touch, solved);
         const Vec3& n = touch.contact.normal;
@@ -474,7 +475,7 @@ bool ContactResponse::releasePulling(int round) {
     return changed && round + 1 < kMaxRounds;
 }
 
-bool ContactResponse::updateFriction(const CoupledSystem& system, const IslandVelocities& solved) {
+bool ContactResponse::updateFriction(const CoupledSystem& system) {
     if (++m_frictionRounds > kFrictionRounds) return false;
     double most = 0.0;
     for (const Touch& touch : m_touches) most = std::max(most, touch.contact.friction * touch.normalImpulse);
@@ -482,22 +483,21 @@ bool ContactResponse::updateFriction(const CoupledSystem& system, const IslandVe
     for (Touch& touch : m_touches) {
         const double limit = touch.contact.friction * touch.normalImpulse;
         if (!touch.active || limit <= 0.0) continue;
-        const Vec3 slide = tangential(touch.contact.normal) * relativeVelocity(touch, solved);
         const double matters = kFrictionChange * std::max(limit, kMinor * most);
-        changed |= touch.sticks ? updateSticking(touch, slide, matters, vertexStiffness(system, touch))
-                                : updateSliding(touch, slide, matters);
+        changed |= touch.sticks ? updateSticking(touch, matters, vertexStiffness(system, touch))
+                                : updateSliding(touch, matters);
     }
     return changed;
 }
 
 /// A contact slides once more holds it than friction can. `matters`: change of impulse that is worth another solve
 /// [N s]; `stiffness`: impulse over velocity of its vertices [kg].
-bool ContactResponse::updateSticking(Touch& touch, const Vec3& slide, double matters, double stiffness) const {
+bool ContactResponse::updateSticking(Touch& touch, double matters, double stiffness) const {
     const double limit = touch.contact.friction * touch.normalImpulse;
     const Vec3 held = touch.impulse - touch.normalImpulse * touch.contact.normal;
     const double force = held.norm();
     if (force <= limit + 0.05 * matters) {
-        const bool creeps = touch.isRow && touch.kappa * slide.norm() > matters;
+        const bool creeps = touch.isRow && touch.kappa * touch.slide.norm() > matters;
         touch.slip.held = held;
         return creeps;
     }
@@ -511,13 +511,13 @@ bool ContactResponse::updateSticking(Touch& touch, const Vec3& slide, double mat
 }
 
 /// A contact sticks once friction turns its sliding around.
-bool ContactResponse::updateSliding(Touch& touch, const Vec3& slide, double matters) const {
+bool ContactResponse::updateSliding(Touch& touch, double matters) const {
     const Slip old = touch.slip;
     Slip& slip = touch.slip;
     slip.known = true;
     slip.limit = touch.contact.friction * touch.normalImpulse;
-    slip.speed = slide.norm();
-    const bool turns = old.known && slide.dot(old.direction) <= 0.0;
+    slip.speed = touch.slide.norm();
+    const bool turns = old.known && touch.slide.dot(old.direction) <= 0.0;
     if ((turns || slip.speed < slowest()) && touch.flips < kMostFlips) {
         touch.sticks = true;
         slip.held.setZero();
@@ -525,7 +525,7 @@ bool ContactResponse::updateSliding(Touch& touch, const Vec3& slide, double matt
         return true;
     }
     const bool damped = turns || touch.flips >= kMostFlips || slip.speed == 0.0;
-    slip.direction = damped ? Vec3::Zero() : Vec3(slide / slip.speed);
+    slip.direction = damped ? Vec3::Zero() : Vec3(touch.slide / slip.speed);
     return (slip.limit * slip.direction - (old.known ? old.limit : 0.0) * old.direction).norm() > matters;
 }
 
@@ -638,7 +638,7 @@ void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
     m_memoryStep = m_input.h;
     for (const Touch& touch : m_touches) {
         if (touch.impulse.isZero(0.0)) continue;  // took no part in the last solve
-        impulses.push_back({touch.contact, touch.impulse, touch.sticks});
+        impulses.push_back({touch.contact, touch.impulse, touch.sticks, touch.slide});
         if (touch.active && touch.normalImpulse > 0.0)
             m_memory[keyOf(touch.contact)] = {touch.normalImpulse, touch.offset,        touch.sticks,
                                               touch.slip,          touch.contact.point, touch.contact.isVertex()};

@@ -72,6 +72,7 @@ class ContactResponse {
         double lifted = 0.0;  ///< by how much that grew in this round [m]
         double normalImpulse = 0.0;
         Vec3 impulse{0, 0, 0};  ///< on the shell [N s]
+        Vec3 slide{0, 0, 0};    ///< tangential velocity relative to the body in the last solve [m/s]
         int changes = 0;        ///< how often it was activated or dropped
     };
     using Key = std::tuple<const void*, const void*, int>;  ///< shell, body, feature
@@ -113,9 +114,9 @@ class ContactResponse {
     void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);
     bool releasePulling(int round);
     void addFriction(const Touch& touch, Mat3& damping, Vec3& load) const;
-    bool updateFriction(const CoupledSystem& system, const IslandVelocities& solved);
-    bool updateSticking(Touch& touch, const Vec3& slide, double matters, double stiffness) const;
-    bool updateSliding(Touch& touch, const Vec3& slide, double matters) const;
+    bool updateFriction(const CoupledSystem& system);
+    bool updateSticking(Touch& touch, double matters, double stiffness) const;
+    bool updateSliding(Touch& touch, double matters) const;
     double slowest() const { return 1e-3 * m_input.h * std::max(m_input.gravity.norm(), 1e-3); }
     bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
     bool closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round);

@@ -50,6 +50,14 @@ struct BodyContact : ContactImpulse {
     Vec3 barycentric{1, 0, 0};            ///< of the point in that triangle
 };
 
+/// What test writers can hold a shell to: in every step, what it gains is what it was given.
+struct ShellLedger {
+    ShellEnergy energy;             ///< as it is, and plastic work so far [J]
+    double frictionLoss = 0.0;      ///< heat of sliding over bodies so far [J]
+    Vec3 momentum = Vec3::Zero();   ///< as it is, see linearMomentum() [N s]
+    Vec3 exchanged = Vec3::Zero();  ///< momentum that contacts have given to bodies so far, to static ones too [N s]
+};
+
 /// One shell of a ShellWorld. Vertices are in the order of the mesh given to ShellWorld::add.
 class ShellBody {
   public:
@@ -99,6 +107,7 @@ class ShellBody {
     std::span<const BodyContact> contacts() const { return m_contacts; }
     /// Linear momentum without the gravity of the coming substep, which Bullet's bodies have not received yet [N s].
     btVector3 linearMomentum() const;
+    ShellLedger ledger() const;
 
   private:
     friend class ShellWorld;
@@ -118,6 +127,9 @@ class ShellBody {
     std::string m_name;
     std::vector<Anchor> m_anchors;
     std::vector<BodyContact> m_contacts;
+    double m_frictionLoss = 0.0;
+    Vec3 m_exchanged = Vec3::Zero();
+    void note(const BodyContact& contact);
     std::vector<btVector3> m_positions;
     mutable std::vector<btVector3> m_normals;
     void publish();  ///< copies positions for drawing
