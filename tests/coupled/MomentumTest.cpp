@@ -54,6 +54,7 @@ TEST_P(FreeSystem, KeepsItsMomentum) {
     EXPECT_LT(drift.angular, 0.12);  // measured: 0.09 to 0.10, see below
     RecordProperty("angular_drift", std::to_string(drift.angular));
 }
+
 /// Also in steps that the solver cuts short (this box and this capsule meet such).
 TEST_P(FreeSystem, KeepsItsLinearMomentumInShortSteps) {
     EXPECT_LT(driftOf(GetParam(), 1.0 / 480).linear, bulletTolerance(1e-9, 2e-6));
