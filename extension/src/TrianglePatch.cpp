@@ -197,8 +197,6 @@ TrianglePatch::Nearest TrianglePatch::classify(int face, const Vec3& p, const Ve
         const Edge& edge = m_edges[m_edgesOf[face][opposite]];
         normal = edge.normal;
         isBorder = edge.faces[1] < 0;
-        if (!isBorder && m_normals[edge.faces[0]].dot(m_normals[edge.faces[1]]) > 1 - kFlat * kFlat)
-            normal = m_normals[face];
     }
     const Vec3 offset = p - point;
     const double distance = offset.norm(), height = normal.dot(offset);
@@ -208,9 +206,8 @@ TrianglePatch::Nearest TrianglePatch::classify(int face, const Vec3& p, const Ve
         const double beyond = (offset - height * normal).norm();
         result.isBehind = beyond <= 1e-6 * distance;
     }
-    const bool isRounding = distance <= 1e-12 * size;
-    if (isRounding) result.isBehind = false;
-    if (taking < 3 && !isRounding && std::abs(height) < (1 - 1e-12) * distance)
+    // On the surface itself the way there has no direction.
+    if (taking < 3 && distance > 1e-9 * size && std::abs(height) < (1 - 1e-12) * distance)
         result.normal = (result.isBehind ? -1 : 1) / distance * offset;
     return result;
 }
