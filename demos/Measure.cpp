@@ -10,7 +10,7 @@ namespace {
 
 double kineticEnergy(const BodyState& body) {
     const Vec3 spin = body.rotation.transpose() * body.angularVelocity;
-    return 0.5 * body.description->mass * body.velocity.squaredNorm() + 0.5 * spin.cwiseAbs2().dot(body.inertia);
+    return 0.5 * body.description->mass * body.velocity.squaredNorm() + 0.5 * spin.dot(body.inertia * spin);
 }
 
 EnergyBalance energyOf(const World& world, const std::vector<BodyState>& bodies) {

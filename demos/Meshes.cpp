@@ -40,6 +40,17 @@ std::shared_ptr<const ConvexHull> loadHull(const std::filesystem::path& file, co
     }
 }
 
+std::shared_ptr<const SurfaceMesh> loadSurface(const std::filesystem::path& file, const std::string& label) {
+    try {
+        const TriangleMesh mesh = loadMeshUnchecked(file);
+        return std::make_shared<const SurfaceMesh>(mesh.positions, mesh.triangles);
+    } catch (const MeshFileError& error) {
+        throw InputError(error.what());
+    } catch (const std::invalid_argument& error) {
+        throw InputError(label + ".shape.mesh: " + file.string() + ": " + error.what());
+    }
+}
+
 Points startPositions(const ShellDescription& shell, const TriangleMesh& rest) {
     Points x = rest.positions;
     if (shell.initialShape) {

@@ -28,13 +28,6 @@ struct TubeMesh {
 };
 using MeshSource = std::variant<MeshFile, GridOptions, HemisphereMesh, TubeMesh>;
 
-struct Transform {
-    Vec3 position = Vec3::Zero();     ///< [m]
-    Vec3 rotationDeg = Vec3::Zero();  ///< about the fixed x, then y, then z axis [degrees]
-
-    Mat3 rotation() const;
-};
-
 /// Vertices of one shell, by number or by an axis-aligned box in world coordinates.
 struct Selection {
     struct Bounds {

@@ -313,20 +313,42 @@ Plane readPlane(ObjectReader& in) {
     return {normal.normalized(), plane[3] / normal.norm()};
 }
 
-Shape readShape(ObjectReader in, const fs::path& folder) {
-    static const Names kinds{"sphere", "box", "capsule", "cylinder", "cone", "plane", "hull"};
-    in.notYet("mesh", "a body that is a triangle mesh");
-    in.notYet("compound", "a compound body");
+Shape readShape(ObjectReader& in, const fs::path& folder);
+
+/// Each part has its shape, position and rotation side by side.
+Compound readCompound(ObjectReader& in, const fs::path& folder) {
+    Compound compound;
+    in.forEach("compound", [&](ObjectReader part) {
+        const Transform transform = readPose(part);
+        compound.parts.push_back({readShape(part, folder), transform});
+        if (std::holds_alternative<Plane>(compound.parts.back().shape))
+            part.fail("plane", "is endless: it can only be a body of its own");
+    });
+    if (compound.parts.empty()) in.fail("compound", "must have at least one part");
+    return compound;
+}
+
+Shape readShape(ObjectReader& in, const fs::path& folder) {
+    static const Names kinds{"sphere", "box", "capsule", "cylinder", "cone", "plane", "hull", "mesh", "compound"};
     const std::string kind = in.oneOf(kinds);
     in.finish();
     if (kind == "sphere") return Sphere{in.number(kind, Range::positive("m"))};
     if (kind == "plane") return readPlane(in);
     if (kind == "hull") return Hull{readFile(in, kind, folder), nullptr};
+    if (kind == "mesh") return Mesh{readFile(in, kind, folder), nullptr};
+    if (kind == "compound") return readCompound(in, folder);
     const auto sizes = in.numbers(kind, kind == "box" ? 3 : 2, Range::positive("m"));
     if (kind == "box") return Box{{sizes[0], sizes[1], sizes[2]}};
     if (kind == "capsule") return Capsule{sizes[0], sizes[1]};
     if (kind == "cylinder") return Cylinder{sizes[0], sizes[1]};
     return Cone{sizes[0], sizes[1]};
+}
+
+bool hasMesh(const Shape& shape) {
+    const auto* compound = std::get_if<Compound>(&shape);
+    return std::holds_alternative<Mesh>(shape) ||
+           (compound && std::any_of(compound->parts.begin(), compound->parts.end(),
+                                    [](const CompoundPart& part) { return hasMesh(part.shape); }));
 }
 
 /// Refuses what would silently do nothing.
@@ -338,6 +360,8 @@ void checkBody(const ObjectReader& in, const BodyDescription& body) {
         in.fail("velocity", "needs a mass > 0, or \"kinematic\": a body of mass 0 stands still");
     if (std::holds_alternative<Plane>(body.shape) && (body.mass > 0 || !body.kinematic.empty()))
         in.fail("shape", "is a plane, which must be static: mass 0 and not kinematic");
+    if (hasMesh(body.shape) && body.mass > 0)
+        in.fail("shape", "is a triangle mesh, which needs mass 0; use \"hull\" for moving bodies");
 }
 
 /// One phase, or a list of them in order of time.
@@ -362,7 +386,8 @@ BodyDescription readBody(ObjectReader in, const fs::path& folder, std::size_t in
     body.name = in.text("name", "body" + std::to_string(index));
     body.label = in.label();
     checkKeys(in, kBodyKeys);
-    body.shape = readShape(in.object("shape"), folder);
+    ObjectReader shape = in.object("shape");
+    body.shape = readShape(shape, folder);
     body.mass = in.number("mass", Range::nonNegative("kg"), body.mass);
     body.transform = readPose(in);
     body.velocity = in.vector("velocity", Vec3::Zero());

@@ -35,6 +35,16 @@ struct ShapeToJson {
     Json operator()(const Cone& s) const { return {{"cone", {s.radius, s.height}}}; }
     Json operator()(const Plane& s) const { return {{"plane", {s.normal.x(), s.normal.y(), s.normal.z(), s.offset}}}; }
     Json operator()(const Hull& s) const { return {{"hull", s.file.string()}}; }
+    Json operator()(const Mesh& s) const { return {{"mesh", s.file.string()}}; }
+    Json operator()(const Compound& s) const {
+        Json parts = Json::array();
+        for (const CompoundPart& part : s.parts) {
+            parts.push_back(std::visit(*this, part.shape));
+            parts.back()["position"] = demo::toJson(part.transform.position);
+            parts.back()["rotation_deg"] = demo::toJson(part.transform.rotationDeg);
+        }
+        return {{"compound", parts}};
+    }
 };
 
 Json toJson(const Selection& selection) {

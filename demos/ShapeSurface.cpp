@@ -84,6 +84,21 @@ Surface flat(const Points& vertices, const Indices<3>& triangles) {
     return surface;
 }
 
+void append(Surface& all, const Surface& part, const Transform& transform) {
+    const Eigen::Index vertices = all.positions.cols(), triangles = all.triangles.cols();
+    const Eigen::Matrix3f rotation = transform.rotation().cast<float>();
+    const Eigen::Vector3f position = transform.position.cast<float>();
+    all.positions.conservativeResize(3, vertices + part.positions.cols());
+    all.normals.conservativeResize(3, vertices + part.positions.cols());
+    all.triangles.conservativeResize(3, triangles + part.triangles.cols());
+    all.positions.rightCols(part.positions.cols()) = (rotation * part.positions).colwise() + position;
+    all.normals.rightCols(part.positions.cols()) = rotation * part.normals;
+    all.triangles.rightCols(part.triangles.cols()) = part.triangles.array() + static_cast<int>(vertices);
+    all.tints.resize(triangles, 1.0f);
+    all.tints.insert(all.tints.end(), part.tints.begin(), part.tints.end());
+    all.tints.resize(all.triangles.cols(), 1.0f);
+}
+
 constexpr double kQuarter = 0.5 * std::numbers::pi;
 
 struct Triangulate {
@@ -122,6 +137,12 @@ struct Triangulate {
     }
     Surface operator()(const Plane&) const { return {}; }
     Surface operator()(const Hull& s) const { return flat(s.geometry->vertices(), s.geometry->triangles()); }
+    Surface operator()(const Mesh& s) const { return flat(s.geometry->vertices(), s.geometry->triangles()); }
+    Surface operator()(const Compound& s) const {
+        Surface all;
+        for (const CompoundPart& part : s.parts) append(all, triangulate(part.shape), part.transform);
+        return all;
+    }
 };
 
 }  // namespace

@@ -41,6 +41,15 @@ struct Distance {
     }
     double operator()(const Plane& s) const { return s.normal.dot(p) - s.offset; }
     double operator()(const Hull& s) const { return s.geometry->signedDistance(p); }
+    double operator()(const Mesh& s) const { return s.geometry->signedDistance(p); }
+    double operator()(const Compound& s) const {
+        double least = std::numeric_limits<double>::infinity();
+        for (const CompoundPart& part : s.parts) {
+            const Vec3 local = part.transform.rotation().transpose() * (p - part.transform.position);
+            least = std::min(least, signedDistance(part.shape, local));
+        }
+        return least;
+    }
 };
 
 struct Radius {
@@ -52,6 +61,15 @@ struct Radius {
     double operator()(const Plane&) const { return std::numeric_limits<double>::infinity(); }
     double operator()(const Hull& s) const {
         return std::sqrt(s.geometry->vertices().colwise().squaredNorm().maxCoeff());
+    }
+    double operator()(const Mesh& s) const {
+        return std::sqrt(s.geometry->vertices().colwise().squaredNorm().maxCoeff());
+    }
+    double operator()(const Compound& s) const {
+        double radius = 0;
+        for (const CompoundPart& part : s.parts)
+            radius = std::max(radius, part.transform.position.norm() + boundingRadius(part.shape));
+        return radius;
     }
 };
 

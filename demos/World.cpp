@@ -3,6 +3,8 @@
 #include <btBulletDynamicsCommon.h>
 
 #include <chrono>
+#include <cmath>
+#include <numbers>
 #include <type_traits>
 
 #include "Loads.h"
@@ -36,7 +38,24 @@ btScalar smallMargin(double size) {
     return btScalar(0.002 * size);
 }
 
+btTransform toBullet(const Transform& transform) {
+    return btTransform(toBullet(transform.rotation()), toBullet(transform.position));
+}
+
+/// What shapes are made of, which Bullet does not own.
+struct ShapeParts {
+    std::vector<std::unique_ptr<btCollisionShape>> shapes;
+    std::vector<std::unique_ptr<btStridingMeshInterface>> meshes;
+};
+
+/// A shape as Bullet's, with its centre of mass at the origin.
+struct CentredShape {
+    std::unique_ptr<btCollisionShape> shape;
+    btTransform centre = btTransform::getIdentity();  ///< in the shape's frame; its axes are the principal ones
+};
+
 struct MakeCollisionShape {
+    ShapeParts& parts;
     using Pointer = std::unique_ptr<btCollisionShape>;
     Pointer operator()(const Sphere& s) const { return std::make_unique<btSphereShape>(btScalar(s.radius)); }
     Pointer operator()(const Box& s) const { return std::make_unique<btBoxShape>(toBullet(Vec3(0.5 * s.size))); }
@@ -63,7 +82,92 @@ struct MakeCollisionShape {
         shape->setMargin(smallMargin(std::cbrt(s.geometry->volume())));
         return shape;
     }
+    Pointer operator()(const Mesh& s) const {
+        auto mesh = std::make_unique<btTriangleMesh>();
+        const Points& x = s.geometry->vertices();
+        for (const auto& t : s.geometry->triangles().colwise())
+            mesh->addTriangle(toBullet(Vec3(x.col(t[0]))), toBullet(Vec3(x.col(t[1]))), toBullet(Vec3(x.col(t[2]))));
+        auto shape = std::make_unique<btBvhTriangleMeshShape>(mesh.get(), true);
+        parts.meshes.push_back(std::move(mesh));
+        return shape;
+    }
+    Pointer operator()(const Compound& s) const;
 };
+
+/// Of bodies that may move [m^3]; parts of a compound that overlap count twice.
+struct Volume {
+    double operator()(const Sphere& s) const { return 4.0 / 3.0 * std::numbers::pi * std::pow(s.radius, 3); }
+    double operator()(const Box& s) const { return s.size.prod(); }
+    double operator()(const Capsule& s) const {
+        return std::numbers::pi * s.radius * s.radius * (s.height + 4.0 / 3.0 * s.radius);
+    }
+    double operator()(const Cylinder& s) const { return std::numbers::pi * s.radius * s.radius * s.height; }
+    double operator()(const Cone& s) const { return std::numbers::pi * s.radius * s.radius * s.height / 3.0; }
+    double operator()(const Plane&) const { return 0.0; }
+    double operator()(const Hull& s) const { return s.geometry->volume(); }
+    double operator()(const Mesh&) const { return 0.0; }
+    double operator()(const Compound& s) const {
+        double sum = 0.0;
+        for (const CompoundPart& part : s.parts) sum += std::visit(*this, part.shape);
+        return sum;
+    }
+};
+
+CentredShape centred(const Shape& shape, ShapeParts& parts) {
+    CentredShape result{std::visit(MakeCollisionShape{parts}, shape)};
+    if (const auto* hull = std::get_if<Hull>(&shape)) result.centre.setOrigin(toBullet(hull->geometry->centroid()));
+    const auto* compound = std::get_if<Compound>(&shape);
+    const double volume = compound ? Volume{}(*compound) : 0.0;
+    if (!(volume > 0)) return result;  // of meshes: cannot move
+    auto& children = static_cast<btCompoundShape&>(*result.shape);
+    std::vector<btScalar> masses;
+    for (const CompoundPart& part : compound->parts)
+        masses.push_back(btScalar(std::visit(Volume{}, part.shape) / volume));
+    btVector3 inertia;
+    children.calculatePrincipalAxisTransform(masses.data(), result.centre, inertia);
+    for (int i = 0; i < children.getNumChildShapes(); ++i)
+        children.updateChildTransform(i, result.centre.inverse() * children.getChildTransform(i), false);
+    children.recalculateLocalAabb();
+    return result;
+}
+
+MakeCollisionShape::Pointer MakeCollisionShape::operator()(const Compound& s) const {
+    auto compound = std::make_unique<btCompoundShape>();
+    for (const CompoundPart& part : s.parts) {
+        CentredShape child = centred(part.shape, parts);
+        compound->addChildShape(toBullet(part.transform) * child.centre, child.shape.get());
+        parts.shapes.push_back(std::move(child.shape));
+    }
+    return compound;
+}
+
+/// Principal moments of a shape whose centre of mass is its origin. Bullet's own of a compound are those of its box.
+btVector3 inertiaOf(const btCollisionShape& shape, const Shape& description, double mass) {
+    btVector3 inertia(0, 0, 0);
+    const auto* compound = std::get_if<Compound>(&description);
+    if (!compound) {
+        shape.calculateLocalInertia(btScalar(mass), inertia);
+        return inertia;
+    }
+    const auto& children = static_cast<const btCompoundShape&>(shape);
+    Mat3 sum = Mat3::Zero();
+    for (int i = 0; i < children.getNumChildShapes(); ++i) {
+        const Shape& part = compound->parts[i].shape;
+        const double share = mass * std::visit(Volume{}, part) / Volume{}(*compound);
+        const Vec3 own = fromBullet(inertiaOf(*children.getChildShape(i), part, share));
+        const Mat3 axes = fromBullet(children.getChildTransform(i).getBasis());
+        const Mat3 arm = skew(fromBullet(children.getChildTransform(i).getOrigin()));
+        sum += axes * own.asDiagonal() * axes.transpose() - share * arm * arm;
+    }
+    return toBullet(Vec3(sum.diagonal()));
+}
+
+void loadGeometry(Shape& shape, const std::string& label) {
+    if (auto* hull = std::get_if<Hull>(&shape)) hull->geometry = loadHull(hull->file, label);
+    if (auto* mesh = std::get_if<Mesh>(&shape)) mesh->geometry = loadSurface(mesh->file, label);
+    if (auto* compound = std::get_if<Compound>(&shape))
+        for (CompoundPart& part : compound->parts) loadGeometry(part.shape, label);
+}
 
 }  // namespace
 
@@ -79,10 +183,11 @@ struct World::Impl {
     /// A body and what it needs to live.
     struct Body {
         const BodyDescription* description = nullptr;
+        ShapeParts parts;
         std::unique_ptr<btCollisionShape> shape;
         std::unique_ptr<btRigidBody, RemoveBody> body{nullptr, RemoveBody{nullptr}};
-        Vec3 centre =
-            Vec3::Zero();  ///< centre of mass in the shape's frame: Bullet's bodies are described from there [m]
+        /// Centre of mass and principal axes in the shape's frame: Bullet's bodies are described from there.
+        btTransform centre = btTransform::getIdentity();
         btVector3 inertia{0, 0, 0};
     };
 
@@ -102,18 +207,15 @@ struct World::Impl {
     void addBody(BodyDescription& description) {
         Body entry;
         entry.description = &description;
-        if (auto* hull = std::get_if<Hull>(&description.shape)) {
-            hull->geometry = loadHull(hull->file, description.label);
-            entry.centre = hull->geometry->centroid();
-        }
-        entry.shape = std::visit(MakeCollisionShape{}, description.shape);
+        loadGeometry(description.shape, description.label);
+        CentredShape centredShape = centred(description.shape, entry.parts);
+        entry.shape = std::move(centredShape.shape);
+        entry.centre = centredShape.centre;
         const auto mass = btScalar(description.mass);
-        if (mass > 0) entry.shape->calculateLocalInertia(mass, entry.inertia);
+        if (mass > 0) entry.inertia = inertiaOf(*entry.shape, description.shape, description.mass);
         btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, entry.shape.get(), entry.inertia);
         info.m_friction = btScalar(description.friction);
-        const Mat3 rotation = description.transform.rotation();
-        const Vec3 centre = description.transform.position + rotation * entry.centre;
-        info.m_startWorldTransform = btTransform(toBullet(rotation), toBullet(centre));
+        info.m_startWorldTransform = toBullet(description.transform) * entry.centre;
         entry.body = decltype(entry.body)(new btRigidBody(info), RemoveBody{&world});
         entry.body->setActivationState(DISABLE_DEACTIVATION);  // Bullet puts bodies to sleep that still swing slowly
         entry.body->setLinearVelocity(toBullet(description.velocity));
@@ -234,9 +336,8 @@ struct World::Impl {
                 origin += std::max(0.0, std::min(end, until) - begun) * velocity;
                 begun = until;
             }
-            btTransform pose = body.body->getWorldTransform();
-            pose.setOrigin(toBullet(Vec3(origin + start.rotation() * body.centre)));
-            body.body->setWorldTransform(pose);
+            const Transform pose{origin, start.rotationDeg};
+            body.body->setWorldTransform(toBullet(pose) * body.centre);
         }
     }
 
@@ -259,16 +360,18 @@ struct World::Impl {
     }
 
     BodyState state(const Body& body) const {
-        const btTransform& pose = body.body->getWorldTransform();
+        const btTransform& centre = body.body->getWorldTransform();
+        const btTransform pose = centre * body.centre.inverse();
+        const Mat3 axes = fromBullet(body.centre.getBasis());
         BodyState state;
         state.description = body.description;
         state.isDynamic = body.description->mass > 0;
         state.rotation = fromBullet(pose.getBasis());
-        state.centre = fromBullet(pose.getOrigin());
-        state.position = state.centre - state.rotation * body.centre;
+        state.centre = fromBullet(centre.getOrigin());
+        state.position = fromBullet(pose.getOrigin());
         state.velocity = fromBullet(body.body->getLinearVelocity());
         state.angularVelocity = fromBullet(body.body->getAngularVelocity());
-        state.inertia = fromBullet(body.inertia);
+        state.inertia = axes * fromBullet(body.inertia).asDiagonal() * axes.transpose();
         return state;
     }
 

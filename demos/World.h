@@ -19,7 +19,7 @@ struct BodyState {
     Vec3 centre = Vec3::Zero();           ///< centre of mass [m]
     Vec3 velocity = Vec3::Zero();         ///< of the centre of mass [m/s]
     Vec3 angularVelocity = Vec3::Zero();  ///< [rad/s]
-    Vec3 inertia = Vec3::Zero();          ///< about the frame's axes [kg m^2]
+    Mat3 inertia = Mat3::Zero();          ///< about the centre, in the frame's axes [kg m^2]
 };
 
 /// What the steps of one frame did and cost.

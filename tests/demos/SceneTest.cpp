@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "Scene.h"
 #include "SceneFile.h"
 #include "TemporaryFolder.h"
+#include "World.h"
 
 namespace jacket::demo {
 namespace {
@@ -98,6 +101,11 @@ TEST_F(SceneTest, EveryMistakeIsNamedWithItsPath) {
         {"shells.0.mesh.grid.cells=[3,0]", "shells.0.mesh.grid.cells.1 must be >= 1 and <= 10000, got 0"},
         {"bodies.0.shape={\"box\":[1,1]}", "bodies.0.shape.box must be a list of 3 numbers, got [1,1]"},
         {"bodies.0.shape={\"sphere\":0}", "bodies.0.shape.sphere [m] must be > 0, got 0"},
+        {"bodies.0.shape={\"mesh\":\"none.obj\"}", "bodies.0.shape.mesh: there is no file"},
+        {"bodies.0.shape={\"compound\":[]}", "bodies.0.shape.compound must have at least one part"},
+        {"bodies.0.shape={\"compound\":[{\"box\":[1,1]}]}",
+         "bodies.0.shape.compound.0.box must be a list of 3 numbers"},
+        {"bodies.0.shape={\"compound\":[{\"plane\":[0,1,0,0]}]}", "bodies.0.shape.compound.0.plane is endless"},
         {"bodies.0.mass=0", "accepted"},
         {"bodies.0={\"shape\":{\"sphere\":1},\"velocity\":[1,0,0]}", "bodies.0.velocity needs a mass > 0"},
         {"bodies.0.kinematic={\"velocity\":[1,0,0]}", "bodies.0.kinematic needs mass 0"},
@@ -127,10 +135,45 @@ TEST_F(SceneTest, EveryMistakeIsNamedWithItsPath) {
         EXPECT_NE(complaint(set).find(expected), std::string::npos) << set << "\n  " << complaint(set);
 }
 
+TEST_F(SceneTest, MeshesAreBodiesThatStand) {
+    m_folder.write("roof.obj", "v -1 0 0\nv 0 0 1\nv 1 0 0\nv 0 1 0\nf 1 2 4\nf 2 3 4\n");
+    const char* shape = "bodies.0.shape={\"compound\":[{\"mesh\":\"roof.obj\",\"position\":[0,1,0]},{\"sphere\":1}]}";
+    EXPECT_NE(complaint(shape).find("needs mass 0; use \"hull\" for moving bodies"), std::string::npos)
+        << complaint(shape);
+    const Scene scene = load(kScene, {"bodies.0.mass=0", shape});
+    const auto& parts = std::get<Compound>(scene.bodies[0].shape).parts;
+    ASSERT_EQ(parts.size(), 2u);
+    EXPECT_EQ(parts[0].transform.position.y(), 1);
+    EXPECT_EQ(toJson(load(toJson(scene).dump())), toJson(scene));
+    EXPECT_NO_THROW(World{scene});
+    m_folder.write("roof.obj", "v -1 0 0\nv 0 0 0\nv 1 0 0\nf 1 2 3\n");
+    EXPECT_THROW(World{scene}, InputError);
+}
+
+/// A dumb-bell of two unequal balls on a rod turns about its centre of mass, wherever that is in its own frame.
+TEST_F(SceneTest, ACompoundTurnsAboutItsCentreOfMass) {
+    const Scene scene = load(kScene, {"gravity=[0,0,0]",
+                                      "bodies.0={\"shape\":{\"compound\":[{\"sphere\":0.1,\"position\":[1,0,0]},"
+                                      "{\"sphere\":0.2,\"position\":[-1,0,0]}]},\"mass\":9,\"position\":[0,5,0],"
+                                      "\"rotation_deg\":[0,0,30],\"angular_velocity\":[0,0,2]}",
+                                      "probes=[]"});
+    World world(scene);
+    const auto start = world.bodies()[0];
+    EXPECT_LT((start.position - Vec3(0, 5, 0)).norm(), 1e-6);
+    EXPECT_LT((start.rotation - scene.bodies[0].transform.rotation()).norm(), 1e-6);
+    const Vec3 centre = Vec3(0, 5, 0) + scene.bodies[0].transform.rotation() * Vec3(-7.0 / 9, 0, 0);  // 1 kg and 8 kg
+    EXPECT_LT((start.centre - centre).norm(), 1e-6);
+    const double alongRod = 0.4 * (1 * 0.01 + 8 * 0.04), across = alongRod + 8.0 / 9 * 4;
+    EXPECT_LT((start.inertia - Vec3(alongRod, across, across).asDiagonal().toDenseMatrix()).norm(), 1e-5);
+    for (int i = 0; i < 30; ++i) world.step();
+    const auto end = world.bodies()[0];
+    EXPECT_LT((end.centre - centre).norm(), 1e-6);
+    EXPECT_NEAR(std::atan2(end.rotation(1, 0), end.rotation(0, 0)), 30 * M_PI / 180 + 0.5, 1e-3);
+}
+
 TEST_F(SceneTest, WhatIsNotThereYetIsRefused) {
     const std::pair<const char*, const char*> cases[] = {
         {"shells.0.self_collision=true", "self-collision is not available yet"},
-        {"bodies.0.shape={\"mesh\":\"a.obj\"}", "a body that is a triangle mesh is not available yet"},
     };
     for (const auto& [set, expected] : cases) {
         EXPECT_THROW(load(kScene, {set}), NotAvailable) << set;

@@ -57,6 +57,40 @@ TEST(SignedDistance, OfTheHullOfACubeIsThatOfTheBox) {
     }
 }
 
+TEST(SignedDistance, OfMeshesIsThatOfTheNearestTriangle) {
+    const ConvexHull cube(cubeCorners(1.0));
+    const Shape mesh = Mesh{"", std::make_shared<const SurfaceMesh>(cube.vertices(), cube.triangles())};
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> coordinate(-2, 2);
+    for (int i = 0; i < 500; ++i) {
+        const Vec3 point(coordinate(random), coordinate(random), coordinate(random));
+        EXPECT_NEAR(signedDistance(mesh, point), signedDistance(Box{{2, 2, 2}}, point), 1e-12) << point.transpose();
+    }
+    Points x(3, 6);  // floor y = 0 and wall x = 0, open at the other sides
+    x << 0, 0, 2, 2, 0, 0, 0, 0, 0, 0, 2, 2, -1, 1, 1, -1, 1, -1;
+    Indices<3> triangles(3, 4);
+    triangles << 0, 0, 0, 0, 1, 2, 5, 4, 2, 3, 4, 1;
+    const Shape valley = Mesh{"", std::make_shared<const SurfaceMesh>(x, triangles)};
+    EXPECT_NEAR(signedDistance(valley, {0.3, 0.2, 0.1}), 0.2, 1e-12);
+    EXPECT_NEAR(signedDistance(valley, {0.1, 0.2, 0.1}), 0.1, 1e-12);
+    EXPECT_NEAR(signedDistance(valley, {0.3, -0.2, 0.1}), -0.2, 1e-12);
+    EXPECT_NEAR(signedDistance(valley, {-0.3, -0.4, 0.1}), -0.5, 1e-12);  // behind the edge between them
+    EXPECT_NEAR(signedDistance(valley, {2.3, -0.4, 0.1}), 0.5, 1e-12);    // beyond the border
+}
+
+TEST(SignedDistance, OfACompoundIsThatOfTheNearestPart) {
+    const Transform turned{{1, 0, 0}, {0, 0, 45}};
+    const Shape compound = Compound{{{Sphere{0.5}, {{-1, 0, 0}, {0, 0, 0}}}, {Box{{1, 1, 1}}, turned}}};
+    EXPECT_NEAR(signedDistance(compound, {-2, 0, 0}), 0.5, 1e-12);
+    EXPECT_NEAR(signedDistance(compound, {1, 1, 0}), 1 - std::sqrt(0.5), 1e-12);
+    EXPECT_NEAR(signedDistance(compound, {1, 0, 0}), -0.5, 1e-12);
+    EXPECT_NEAR(boundingRadius(compound), 1 + std::sqrt(0.75), 1e-12);
+    const Surface surface = triangulate(compound);
+    ASSERT_EQ(surface.tints.size(), static_cast<std::size_t>(surface.triangles.cols()));
+    for (const auto& p : surface.positions.colwise())
+        EXPECT_NEAR(signedDistance(compound, p.cast<double>()), 0, 1e-6) << p.transpose();
+}
+
 TEST(SignedDistance, IsZeroOnTheSurfaceThatIsDrawn) {
     const Shape shapes[] = {Sphere{0.3}, Box{{0.2, 0.4, 0.6}}, Capsule{0.2, 0.5}, Cylinder{0.2, 0.5}, Cone{0.3, 0.5}};
     for (const Shape& shape : shapes) {
