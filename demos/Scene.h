@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -105,6 +106,37 @@ struct BodyDescription {
     Vec3 angularVelocity = Vec3::Zero();  ///< [rad/s]
     double friction = 0.5;                ///< [-]
     std::vector<Kinematic> kinematic;     ///< phases, in order of time; empty: not kinematic
+    bool isOfMultiBody = false;           ///< base or link of one of Scene::multiBodies
+};
+
+/// What a motor of a joint does until some time; after the last phase it holds the joint with that phase's force.
+struct MotorPhase {
+    double velocity;  ///< of the joint that it aims at [m/s, rad/s]
+    double maxForce;  ///< [N, N m]
+    double until;     ///< [s]
+};
+
+struct Joint {
+    enum class Kind { Fixed, Prismatic, Revolute };
+    Kind kind = Kind::Fixed;
+    Vec3 axis = Vec3::UnitY();                    ///< in the world at the start, unit
+    Vec3 pivot = Vec3::Zero();                    ///< in the world at the start [m]
+    std::vector<MotorPhase> motor;                ///< empty: the joint moves freely
+    std::optional<std::array<double, 2>> limits;  ///< of its travel from the start [m, rad]
+};
+
+/// A link of a multibody: how one of the scene's bodies is joined to its parent.
+struct LinkDescription {
+    int body;    ///< in Scene::bodies
+    int parent;  ///< among the links; -1: the base
+    Joint joint;
+};
+
+/// Bodies joined in a tree (btMultiBody). The base is fixed if its mass is 0.
+struct MultiBodyDescription {
+    std::string name;
+    int base;  ///< in Scene::bodies
+    std::vector<LinkDescription> links;
 };
 
 struct ProbeDescription {
@@ -131,6 +163,7 @@ struct Scene {
     int loadIncrements = 1;  ///< in which gravity, forces and pressure grow there
     std::vector<ShellDescription> shells;
     std::vector<BodyDescription> bodies;
+    std::vector<MultiBodyDescription> multiBodies;
     std::vector<ProbeDescription> probes;
     CameraDescription camera;
 

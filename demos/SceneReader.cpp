@@ -14,9 +14,9 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-constexpr std::array kSceneKeys{"name",   "description",     "dt",      "substeps", "seconds", "seed",
-                                "mode",   "load_increments", "gravity", "wind",     "shells",  "bodies",
-                                "probes", "camera"};
+constexpr std::array kSceneKeys{"name",        "description",     "dt",      "substeps", "seconds", "seed",
+                                "mode",        "load_increments", "gravity", "wind",     "shells",  "bodies",
+                                "multibodies", "probes",          "camera"};
 constexpr std::array kShellKeys{"name",
                                 "mesh",
                                 "initial_shape",
@@ -42,6 +42,10 @@ constexpr std::array kShellKeys{"name",
                                 "self_collision"};
 constexpr std::array kBodyKeys{
     "name", "shape", "mass", "position", "rotation_deg", "velocity", "angular_velocity", "friction", "kinematic"};
+constexpr std::array kMultiBodyKeys{"name", "base", "links"};
+constexpr std::array kBaseKeys{"shape", "mass", "position", "friction"};
+constexpr std::array kLinkKeys{"name",  "parent",   "shape", "mass",   "joint",
+                               "pivot", "position", "motor", "limits", "friction"};
 constexpr std::array kProbeKeys{"name", "shell", "body", "box", "vertices", "quantity"};
 constexpr std::array kMaterialKeys{
     "preset",      "young",      "poisson",           "thickness",         "density",      "yield",
@@ -398,6 +402,82 @@ BodyDescription readBody(ObjectReader in, const fs::path& folder, std::size_t in
     return body;
 }
 
+/// What bodies of multibodies have in common with others.
+BodyDescription readJointedBody(ObjectReader& in, const fs::path& folder) {
+    BodyDescription body;
+    body.label = in.label();
+    body.shape = readShape(in.object("shape"), folder);
+    if (std::holds_alternative<Plane>(body.shape)) in.fail("shape", "is a plane, which cannot be jointed");
+    body.transform.position = in.vector("position", Vec3::Zero());
+    body.friction = in.number("friction", Range::nonNegative(), body.friction);
+    body.isOfMultiBody = true;
+    return body;
+}
+
+Joint readJointKind(ObjectReader in) {
+    static const Names kinds{"fixed", "prismatic", "revolute"};
+    const std::string kind = in.oneOf(kinds);
+    in.finish();
+    Joint joint;
+    if (kind == "fixed") {
+        if (!in.flag(kind, true)) in.fail(kind, "must be true");
+        return joint;
+    }
+    joint.kind = kind == "prismatic" ? Joint::Kind::Prismatic : Joint::Kind::Revolute;
+    joint.axis = in.vector(kind);
+    if (!(joint.axis.norm() > 0)) in.fail(kind, "must be an axis, got [0, 0, 0]");
+    joint.axis.normalize();
+    return joint;
+}
+
+Joint readJoint(ObjectReader& in, const Vec3& position) {
+    Joint joint = readJointKind(in.object("joint"));
+    joint.pivot = in.vector("pivot", position);
+    in.forEach("motor", [&](ObjectReader phase) {
+        const double start = joint.motor.empty() ? 0.0 : joint.motor.back().until;
+        joint.motor.push_back({phase.number("velocity", Range::any("m/s or rad/s")),
+                               phase.number("max_force", Range::nonNegative("N or N m")),
+                               phase.number("until", Range::nonNegative("s"), 1e9)});
+        if (joint.motor.back().until < start) phase.fail("until", "must not be before the phase that precedes it ends");
+        phase.finish();
+    });
+    if (in.has("limits")) {
+        const auto limits = in.numbers("limits", 2, Range::any("m or rad"));
+        if (!(limits[0] <= 0.0 && limits[1] >= 0.0)) in.fail("limits", "must be [low <= 0, high >= 0]");
+        joint.limits = {limits[0], limits[1]};
+    }
+    if (joint.kind == Joint::Kind::Fixed && (!joint.motor.empty() || joint.limits))
+        in.fail("joint", "is fixed, and can have neither a motor nor limits");
+    return joint;
+}
+
+/// Its base and links join the scene's bodies.
+void readMultiBody(ObjectReader in, const fs::path& folder, Scene& scene) {
+    checkKeys(in, kMultiBodyKeys);
+    MultiBodyDescription multiBody;
+    multiBody.name = in.text("name", "multibody" + std::to_string(scene.multiBodies.size()));
+    ObjectReader base = in.object("base");
+    checkKeys(base, kBaseKeys);
+    multiBody.base = static_cast<int>(scene.bodies.size());
+    scene.bodies.push_back(readJointedBody(base, folder));
+    scene.bodies.back().name = multiBody.name;
+    scene.bodies.back().mass = base.number("mass", Range::nonNegative("kg"), 0.0);
+    Names parents{"base"};
+    in.forEach("links", [&](ObjectReader link) {
+        checkKeys(link, kLinkKeys);
+        BodyDescription body = readJointedBody(link, folder);
+        body.name = link.text("name");
+        body.mass = link.number("mass", Range::positive("kg"));
+        const std::string parent = link.choice("parent", parents, "base");
+        const auto index = std::find(parents.begin(), parents.end(), parent) - parents.begin();
+        multiBody.links.push_back({static_cast<int>(scene.bodies.size()), static_cast<int>(index) - 1,
+                                   readJoint(link, body.transform.position)});
+        parents.push_back(body.name);
+        scene.bodies.push_back(std::move(body));
+    });
+    scene.multiBodies.push_back(std::move(multiBody));
+}
+
 template <class Things>
 int indexByName(ObjectReader& in, std::string_view key, const Things& things) {
     Names names;
@@ -490,6 +570,7 @@ Scene readScene(const Json& document, const SceneOrigin& origin) {
     in.forEach("bodies", [&](ObjectReader body) {
         scene.bodies.push_back(readBody(std::move(body), origin.folder, scene.bodies.size()));
     });
+    in.forEach("multibodies", [&](ObjectReader body) { readMultiBody(std::move(body), origin.folder, scene); });
     if (scene.shells.empty()) throw InputError(in.label("shells") + " must have at least one shell");
     requireDistinctNames(scene.shells, "shells");
     requireDistinctNames(scene.bodies, "bodies");

@@ -128,6 +128,35 @@ Json toJson(const BodyDescription& body) {
     return json;
 }
 
+Json jointedToJson(const BodyDescription& body) {
+    return {{"shape", std::visit(ShapeToJson{}, body.shape)},
+            {"mass", body.mass},
+            {"position", demo::toJson(body.transform.position)},
+            {"friction", body.friction}};
+}
+
+Json toJson(const Joint& joint) {
+    if (joint.kind == Joint::Kind::Fixed) return {{"fixed", true}};
+    return {{joint.kind == Joint::Kind::Prismatic ? "prismatic" : "revolute", demo::toJson(joint.axis)}};
+}
+
+Json toJson(const MultiBodyDescription& multiBody, const Scene& scene) {
+    Json json{{"name", multiBody.name}, {"base", jointedToJson(scene.bodies[multiBody.base])}};
+    json["links"] = Json::array();
+    for (const LinkDescription& link : multiBody.links) {
+        Json entry{{"name", scene.bodies[link.body].name}};
+        entry["parent"] = link.parent < 0 ? "base" : scene.bodies[multiBody.links[link.parent].body].name;
+        entry.update(jointedToJson(scene.bodies[link.body]));
+        entry["joint"] = toJson(link.joint);
+        entry["pivot"] = demo::toJson(link.joint.pivot);
+        for (const auto& [velocity, maxForce, until] : link.joint.motor)
+            entry["motor"].push_back({{"velocity", velocity}, {"max_force", maxForce}, {"until", until}});
+        if (const auto& limits = link.joint.limits) entry["limits"] = *limits;
+        json["links"].push_back(std::move(entry));
+    }
+    return json;
+}
+
 Json toJson(const ProbeDescription& probe, const Scene& scene) {
     Json json{{"name", probe.name}};
     if (probe.body >= 0) json["body"] = scene.bodies[probe.body].name;
@@ -166,7 +195,9 @@ Json toJson(const Scene& scene) {
     if (scene.wind) json["wind"] = toJson(*scene.wind);
     json["shells"] = json["bodies"] = json["probes"] = Json::array();
     for (const auto& shell : scene.shells) json["shells"].push_back(toJson(shell));
-    for (const auto& body : scene.bodies) json["bodies"].push_back(toJson(body));
+    for (const auto& body : scene.bodies)
+        if (!body.isOfMultiBody) json["bodies"].push_back(toJson(body));
+    for (const auto& multiBody : scene.multiBodies) json["multibodies"].push_back(toJson(multiBody, scene));
     for (const auto& probe : scene.probes) json["probes"].push_back(toJson(probe, scene));
     json["camera"] = toJson(scene.camera);
     return json;

@@ -1,5 +1,8 @@
 #include "World.h"
 
+#include <BulletDynamics/Featherstone/btMultiBodyConstraintSolver.h>
+#include <BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h>
+#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 #include <btBulletDynamicsCommon.h>
 
 #include <chrono>
@@ -9,6 +12,7 @@
 
 #include "Loads.h"
 #include "Meshes.h"
+#include "MultiBody.h"
 #include "jacket/bullet/ShellWorld.h"
 
 namespace jacket::demo {
@@ -189,11 +193,27 @@ struct World::Impl {
         /// Centre of mass and principal axes in the shape's frame: Bullet's bodies are described from there.
         btTransform centre = btTransform::getIdentity();
         btVector3 inertia{0, 0, 0};
+        const MultiBody* multiBody = nullptr;  ///< that it is part of, instead of `body`
+        std::size_t part = 0;                  ///< of it
     };
 
+    /// Multibodies need a world of their own kind, whose solver treats friction between bodies a little differently.
+    std::unique_ptr<btDiscreteDynamicsWorld> makeWorld() {
+        if (scene.multiBodies.empty()) {
+            solver = std::make_unique<btSequentialImpulseConstraintSolver>();
+            return std::make_unique<btDiscreteDynamicsWorld>(&dispatcher, &broadphase, solver.get(), &configuration);
+        }
+        auto multiBodySolver = std::make_unique<btMultiBodyConstraintSolver>();
+        auto made =
+            std::make_unique<btMultiBodyDynamicsWorld>(&dispatcher, &broadphase, multiBodySolver.get(), &configuration);
+        solver = std::move(multiBodySolver);
+        return made;
+    }
+
     explicit Impl(const Scene& s) : scene(s) {
-        world.setGravity(toBullet(scene.gravity));
+        world->setGravity(toBullet(scene.gravity));
         for (BodyDescription& body : scene.bodies) addBody(body);
+        for (const MultiBodyDescription& multiBody : scene.multiBodies) addMultiBody(multiBody);
         for (std::size_t k = 0; k < scene.shells.size(); ++k) addShell(scene.shells[k], scene.seed + k);
         for (const ProbeDescription& probe : scene.probes)
             if (probe.where) probe.where->vertices(starts[probe.shell]);  // throws now rather than after the run
@@ -213,17 +233,40 @@ struct World::Impl {
         entry.centre = centredShape.centre;
         const auto mass = btScalar(description.mass);
         if (mass > 0) entry.inertia = inertiaOf(*entry.shape, description.shape, description.mass);
+        if (description.isOfMultiBody) {
+            bodies.push_back(std::move(entry));
+            return;
+        }
         btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, entry.shape.get(), entry.inertia);
         info.m_friction = btScalar(description.friction);
         info.m_startWorldTransform = toBullet(description.transform) * entry.centre;
-        entry.body = decltype(entry.body)(new btRigidBody(info), RemoveBody{&world});
+        entry.body = decltype(entry.body)(new btRigidBody(info), RemoveBody{world.get()});
         entry.body->setActivationState(DISABLE_DEACTIVATION);  // Bullet puts bodies to sleep that still swing slowly
         entry.body->setLinearVelocity(toBullet(description.velocity));
         entry.body->setAngularVelocity(toBullet(description.angularVelocity));
         if (!description.kinematic.empty())
             entry.body->setCollisionFlags(entry.body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
-        world.addRigidBody(entry.body.get());
+        world->addRigidBody(entry.body.get());
         bodies.push_back(std::move(entry));
+    }
+
+    void addMultiBody(const MultiBodyDescription& description) {
+        std::vector<int> indices{description.base};
+        for (const LinkDescription& link : description.links) indices.push_back(link.body);
+        std::vector<MultiBodyPart> parts;
+        for (const int i : indices) {
+            if (!(bodies[i].centre.getBasis() == btMatrix3x3::getIdentity()))
+                throw InputError(bodies[i].description->label +
+                                 ".compound: the principal axes of a multibody's part must be those of its frame");
+            parts.push_back({bodies[i].description, bodies[i].shape.get(), fromBullet(bodies[i].centre.getOrigin()),
+                             fromBullet(bodies[i].inertia)});
+        }
+        auto& multiBodyWorld = static_cast<btMultiBodyDynamicsWorld&>(*world);
+        multiBodies.push_back(std::make_unique<MultiBody>(multiBodyWorld, description, parts));
+        for (std::size_t k = 0; k < indices.size(); ++k) {
+            bodies[indices[k]].multiBody = multiBodies.back().get();
+            bodies[indices[k]].part = k;
+        }
     }
 
     void addShell(const ShellDescription& description, std::uint64_t seed) {
@@ -295,7 +338,7 @@ struct World::Impl {
         const auto start = Clock::now();
         for (int k = 0; k < shells.size(); ++k) {
             const StaticReport done =
-                shells[k].settle(world.getGravity(), {.increments = scene.loadIncrements, .maxIterations = 200});
+                shells[k].settle(world->getGravity(), {.increments = scene.loadIncrements, .maxIterations = 200});
             report.converged = report.converged && done.converged;
             report.solves += done.iterations;
             report.dents.emplace_back();
@@ -344,9 +387,10 @@ struct World::Impl {
     void step(FrameReport& report) {
         const double h = scene.dt / scene.substeps;
         moveKinematicBodies(time + h);
+        for (const auto& multiBody : multiBodies) multiBody->drive(time, h);
         using Clock = std::chrono::steady_clock;
         const auto start = Clock::now();
-        world.stepSimulation(btScalar(h), 0);  // 0: exactly one step, of exactly h
+        world->stepSimulation(btScalar(h), 0);  // 0: exactly one step, of exactly h
         report.seconds += std::chrono::duration<double>(Clock::now() - start).count();
         time += h;
         const bullet::WorldReport& last = shells.lastStep();
@@ -360,7 +404,9 @@ struct World::Impl {
     }
 
     BodyState state(const Body& body) const {
-        const btTransform& centre = body.body->getWorldTransform();
+        const btCollisionObject* object = body.body.get();
+        if (body.multiBody) object = &body.multiBody->collider(body.part);
+        const btTransform& centre = object->getWorldTransform();
         const btTransform pose = centre * body.centre.inverse();
         const Mat3 axes = fromBullet(body.centre.getBasis());
         BodyState state;
@@ -369,9 +415,15 @@ struct World::Impl {
         state.rotation = fromBullet(pose.getBasis());
         state.centre = fromBullet(centre.getOrigin());
         state.position = fromBullet(pose.getOrigin());
-        state.velocity = fromBullet(body.body->getLinearVelocity());
-        state.angularVelocity = fromBullet(body.body->getAngularVelocity());
         state.inertia = axes * fromBullet(body.inertia).asDiagonal() * axes.transpose();
+        if (body.multiBody) {
+            const MultiBody::Velocities velocities = body.multiBody->velocities();
+            state.velocity = velocities.linear[body.part];
+            state.angularVelocity = velocities.angular[body.part];
+        } else {
+            state.velocity = fromBullet(body.body->getLinearVelocity());
+            state.angularVelocity = fromBullet(body.body->getAngularVelocity());
+        }
         return state;
     }
 
@@ -379,10 +431,11 @@ struct World::Impl {
     btDefaultCollisionConfiguration configuration;
     btCollisionDispatcher dispatcher{&configuration};
     btDbvtBroadphase broadphase;
-    btSequentialImpulseConstraintSolver solver;
-    btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
+    std::unique_ptr<btConstraintSolver> solver;
+    std::unique_ptr<btDiscreteDynamicsWorld> world = makeWorld();
     std::vector<Body> bodies;
-    bullet::ShellWorld shells{world};
+    std::vector<std::unique_ptr<MultiBody>> multiBodies;
+    bullet::ShellWorld shells{*world};
     std::vector<Points> starts;  ///< positions at time 0, unperturbed
     double time = 0.0;
 };
@@ -441,8 +494,8 @@ std::vector<BodyState> World::bodies() const {
 Vec3 World::linearMomentum() const {
     Vec3 momentum = Vec3::Zero();
     for (int k = 0; k < shellCount(); ++k) momentum += fromBullet(m_impl->shells[k].linearMomentum());
-    for (const auto& body : m_impl->bodies)
-        if (body.description->mass > 0) momentum += body.description->mass * fromBullet(body.body->getLinearVelocity());
+    for (const BodyState& body : bodies())
+        if (body.description->mass > 0) momentum += body.description->mass * body.velocity;
     return momentum;
 }
 

@@ -70,6 +70,59 @@ TEST_F(SceneTest, WrittenOutItGivesItselfAgain) {
     EXPECT_EQ(toJson(load(written.dump())), written);
 }
 
+constexpr const char* kMultiBody =
+    R"(multibodies=[{"name":"arm","base":{"shape":{"box":[1,1,1]},"position":[0,2,0]},"links":[)"
+    R"({"name":"slide","shape":{"sphere":0.1},"mass":1,"position":[0,1.5,0],"joint":{"prismatic":[0,2,0]},)"
+    R"("motor":[{"velocity":1,"max_force":5,"until":1},{"velocity":-1,"max_force":4}],"limits":[-0.5,0]},)"
+    R"({"name":"hand","parent":"slide","shape":{"sphere":0.1},"mass":1,"position":[1,1.5,0],"pivot":[0.5,1.5,0],)"
+    R"("joint":{"revolute":[0,0,1]}},)"
+    R"({"name":"nail","parent":"hand","shape":{"sphere":0.1},"mass":1,"joint":{"fixed":true}}]}])";
+
+TEST_F(SceneTest, LinksOfMultiBodiesAreBodies) {
+    const Scene scene = load(kScene, {kMultiBody, R"(probes.0={"name":"p","body":"hand","quantity":"velocity"})"});
+    ASSERT_EQ(scene.bodies.size(), 5u);
+    EXPECT_EQ(scene.bodies[1].name, "arm");
+    EXPECT_EQ(scene.probes[0].body, 3);
+    const MultiBodyDescription& arm = scene.multiBodies.at(0);
+    EXPECT_EQ(arm.base, 1);
+    EXPECT_EQ(arm.links[0].joint.axis, Vec3(0, 1, 0));
+    EXPECT_EQ(arm.links[0].joint.motor.at(1).maxForce, 4);
+    EXPECT_EQ(arm.links[1].parent, 0);
+    EXPECT_EQ(arm.links[1].joint.pivot, Vec3(0.5, 1.5, 0));
+    EXPECT_EQ(arm.links[2].joint.kind, Joint::Kind::Fixed);
+    const Json written = toJson(scene);
+    EXPECT_EQ(written["bodies"].size(), 1u);
+    EXPECT_EQ(toJson(load(written.dump())), written);
+}
+
+TEST_F(SceneTest, MistakesInMultiBodiesAreNamed) {
+    const std::pair<const char*, const char*> cases[] = {
+        {"multibodies.0.link=1", "multibodies.0: unknown key \"link\"; did you mean \"links\"?"},
+        {"multibodies.arm.links.slide.motr=1", "unknown key \"motr\"; did you mean \"motor\"?"},
+        {"multibodies.0.links.1.parent=slid", "has the unknown value \"slid\"; did you mean \"slide\"?"},
+        {"multibodies.0.links.0.parent=hand", "multibodies.0.links.0.parent has the unknown value"},  // comes later
+        {"multibodies.0.links.0.mass=0", "multibodies.0.links.0.mass [kg] must be > 0, got 0"},
+        {"multibodies.0.links.0.joint={\"prismatic\":[0,0,0]}",
+         "multibodies.0.links.0.joint.prismatic must be an axis"},
+        {"multibodies.0.links.0.joint={\"ball\":true}", "unknown key \"ball\""},
+        {"multibodies.0.links.2.limits=[-1,1]", "multibodies.0.links.2.joint is fixed"},
+        {"multibodies.0.links.0.limits=[0.1,1]", "multibodies.0.links.0.limits must be [low <= 0, high >= 0]"},
+        {"multibodies.0.links.0.motor.1.until=0.5", "must not be before the phase that precedes it ends"},
+        {"multibodies.0.base.shape={\"plane\":[0,1,0,0]}", "is a plane, which cannot be jointed"},
+        {"multibodies.0.name=ball", "two bodies are called \"ball\""},
+    };
+    const std::string whole = toJson(load(kScene, {kMultiBody})).dump();
+    for (const auto& [set, expected] : cases) {
+        std::string message = "accepted";
+        try {
+            load(whole, {set});
+        } catch (const InputError& error) {
+            message = error.what();
+        }
+        EXPECT_NE(message.find(expected), std::string::npos) << set << "\n  " << message;
+    }
+}
+
 TEST_F(SceneTest, SetReplacesValuesByIndexAndByName) {
     const Scene scene =
         load(kScene, {"shells.sheet.friction=0.1", "bodies.0.mass=3", "shells.0.material.thickness=0.002",
