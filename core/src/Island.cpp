@@ -15,7 +15,7 @@ namespace jacket {
 namespace {
 
 constexpr double kEnergyGain = 0.02;     ///< of a step that is linearised again: see energyGain
-constexpr double kMostEnergyGain = 0.1;  ///< of a step that is accepted as it is
+constexpr double kMostEnergyGain = 1.0;  ///< of a step that is accepted as it is
 
 /// From a body's centre of mass to where the shell touches it, at the start of the step.
 Vec3 contactArm(const IslandInput& input, const Contact& contact) {
@@ -228,7 +228,12 @@ void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& 
     constexpr int kMostHalvings = 40;
     report.limited = true;
     const Points rigid = rigidMotion(input, v);
-    for (int halving = 0; halving < kMostHalvings && energyGain(input) > kEnergyGain; ++halving) blend(input, rigid);
+    const bool isHeld = std::any_of(input.shells.begin(), input.shells.end(),
+                                    [](const Shell* shell) { return shell->pinCount() > 0; });
+    for (int halving = 0; halving < kMostHalvings && energyGain(input) > kEnergyGain; ++halving) {
+        blend(input, rigid);
+        if (isHeld) impulseShare *= 0.5;  // its pins take the momentum; a light body would keep the shell's old speed
+    }
     Points coasting = start;
     for (std::size_t k = 0; k < input.shells.size(); ++k)
         coasting.middleCols(offsets[k], input.shells[k]->vertexCount()).colwise() += (input.h * input.gravity).eval();
@@ -276,7 +281,7 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> IslandSolver::Impl::endTwists() const {
 }
 
 /// What shells and bodies gain in the solved step besides what gravity, forces and moved supports do, over the energy
-/// that they start with.
+/// that they start with, or that gravity gives what starts from rest.
 double IslandSolver::Impl::energyGain(const IslandInput& input) const {
     if (input.wind) return 0.0;  // what wind and pressure give is not known
     double atStart = 0.0, gain = 0.0;
@@ -290,7 +295,7 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
             const Vec3 mean = 0.5 * (part.col(i) + before.col(i));
             const double kinetic = 0.5 * shell.masses()[i] * before.col(i).squaredNorm();
             const Vec3 load = shell.masses()[i] * input.gravity + shell.forces().col(i);
-            atStart += kinetic;
+            atStart += kinetic + 0.5 * shell.masses()[i] * (stepOf[k] * input.gravity).squaredNorm();
             gain += 0.5 * shell.masses()[i] * part.col(i).squaredNorm() - kinetic - stepOf[k] * load.dot(mean);
         }
         const double elastic = shell.elasticEnergy(shell.positions());

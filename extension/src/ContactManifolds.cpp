@@ -21,25 +21,16 @@ struct FeaturePoint {
     btManifoldPoint point;
 };
 
-/// Some triangle that has the vertex or edge of a contact, or its triangle.
-int triangleOf(const HalfEdgeMesh& mesh, int feature) {
-    const int edges = static_cast<int>(mesh.edges().size());
-    if (feature >= mesh.vertexCount() + edges) return feature - mesh.vertexCount() - edges;
-    if (feature >= mesh.vertexCount()) return mesh.edges()[feature - mesh.vertexCount()].halfEdge / 3;
-    const auto around = mesh.trianglesAround(feature);
-    return around.empty() ? -1 : around.front();
-}
-
-FeaturePoint toManifoldPoint(const ShellBody& shell, const btCollisionObject& body, const ContactImpulse& impulse) {
+FeaturePoint toManifoldPoint(const BodyContact& impulse) {
     const Contact& contact = impulse.contact;
     const btVector3 onBody = toBullet(contact.point),
                     onShell = toBullet(Vec3(contact.point + contact.gap * contact.normal));
-    btManifoldPoint point(onShell, body.getWorldTransform().inverse() * onBody, toBullet(contact.normal),
+    btManifoldPoint point(onShell, impulse.object->getWorldTransform().inverse() * onBody, toBullet(contact.normal),
                           btScalar(contact.gap));
     point.m_positionWorldOnA = onShell;
     point.m_positionWorldOnB = onBody;
     point.m_partId0 = 0;
-    point.m_index0 = triangleOf(shell.shell().mesh(), contact.feature);
+    point.m_index0 = impulse.triangle;
     point.m_combinedFriction = btScalar(contact.friction);
     const double along = impulse.impulse.dot(contact.normal);
     const Vec3 across = impulse.impulse - along * contact.normal;
@@ -122,7 +113,7 @@ std::vector<ContactManifolds::Touch> ContactManifolds::collect(btCollisionWorld&
             if (!pair) continue;
             auto touch = std::find_if(touches.begin(), touches.end(), [&](const Touch& t) { return t.pair == pair; });
             if (touch == touches.end()) touch = touches.insert(touch, {pair, {}});
-            touch->points.push_back(toManifoldPoint(*shell, body, shell->contacts()[i]));
+            touch->points.push_back(toManifoldPoint(shell->contacts()[i]));
         }
     }
     for (Touch& touch : touches) {

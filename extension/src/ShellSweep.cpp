@@ -9,6 +9,7 @@ namespace {
 
 constexpr int kMostAdvances = 60;  // of one triangle towards one piece; then the contact is taken where it is
 constexpr double kTouching = 0.3;  // of the contact thickness: closer than this they touch
+constexpr double kAtVertex = 0.9;  // weight of a corner beyond which a triangle's contact is that corner's
 constexpr double kShallow = 0.5;   // of the body: what goes in less than that is found at the end of the step
 
 }  // namespace
@@ -110,7 +111,7 @@ void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& cont
                 contact->friction = m_shells[shell]->options().friction * double(obstacle.object->getFriction());
                 contact->feature = Feature::triangle(t, mesh.vertexCount(), edgeCount);
                 int corner = 0;
-                if (contact->weights.maxCoeff(&corner) > 1.0 - 1e-6) {
+                if (contact->weights.maxCoeff(&corner) > kAtVertex) {
                     contact->feature = Feature::vertex(corners[corner]);
                     contact->vertices.fill(corners[corner]);
                     contact->weights = Vec3::UnitX();

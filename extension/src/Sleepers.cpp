@@ -1,10 +1,12 @@
 #include "Sleepers.h"
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 
 #include <algorithm>
 #include <limits>
 
+#include "CoupledLinks.h"
 #include "ShellContacts.h"
 #include "ShellProxy.h"
 
@@ -28,17 +30,24 @@ bool samePose(const btTransform& a, const btTransform& b) {
                btScalar(1e-12);
 }
 
+/// Whether it stands still until something wakes it.
 bool sleeps(const btCollisionObject& object) {
+    if (const auto* link = btMultiBodyLinkCollider::upcast(&object)) return isPrescribed(*link);
     return object.isStaticOrKinematicObject() || !object.isActive();
 }
 
-/// Whether Bullet would let it sleep by now.
+/// Whether Bullet would let it sleep by now. Multibodies do not say; they must be the first.
 bool isCalm(const btCollisionObject& object) {
+    if (btMultiBodyLinkCollider::upcast(&object)) return sleeps(object);
     return sleeps(object) || object.getDeactivationTime() >= btScalar(kNearlyCalm) * gDeactivationTime;
 }
 
 /// Left alone, Bullet would put it to sleep: it knows of no contact with the shell.
-void keepAwake(btCollisionObject& object) {
+void keepAwake(btCollisionObject& object, bool isShellQuiet) {
+    if (auto* link = btMultiBodyLinkCollider::upcast(&object)) {
+        if (!isShellQuiet && !sleeps(object)) link->m_multiBody->wakeUp();  // sets its timer back
+        return;
+    }
     if (sleeps(object) || object.getActivationState() == DISABLE_DEACTIVATION) return;
     if (object.getActivationState() == WANTS_DEACTIVATION) object.setActivationState(ACTIVE_TAG);
     object.setDeactivationTime(std::min(object.getDeactivationTime(), btScalar(kNearlyCalm) * gDeactivationTime));
@@ -143,7 +152,7 @@ void Sleepers::rest(const Vec3& gravity, double h) {
         if (std::exchange(rest.wakeAsked, false)) rest.place.resize(3, 0);
         if (rest.asleep) continue;
         candidates.push_back({shell.get(), supportsOf(*shell), keepsPlace(*shell, h)});
-        for (btCollisionObject* object : candidates.back().supports) keepAwake(*object);
+        for (btCollisionObject* object : candidates.back().supports) keepAwake(*object, candidates.back().ready);
     }
     dropRestless(candidates);
     for (const Candidate& c : candidates) {

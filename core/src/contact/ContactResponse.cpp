@@ -17,7 +17,9 @@ constexpr double kOffsetDecay = 0.998;    // a step: a lift that is no longer ne
 constexpr double kPull = 1e-3;            // of the largest impulse: a contact that pulls less may stay for the step
 constexpr int kFrictionRounds = 4;        // then the lagged friction of the last round stands
 constexpr int kMostFlips = 3;             // a contact that sticks and slides by turns more often is damped instead
+constexpr double kMostFriction = 1.2;     // of what Coulomb allows: more is solved again
 constexpr double kNearEdge = 0.1;         // weight of a triangle's corner below which its contact is an edge's
+constexpr double kSamePoint = 0.15;       // of an edge: how far it may move in a round
 constexpr double kSameContact = 0.3;      // of an edge: how far the point of a face's contact may move in a step
 constexpr double kFrictionChange = 0.02;  // of a contact's friction: less needs no other solve
 constexpr double kMinor = 0.2;            // of the largest friction: what less does is compared with this
@@ -425,7 +427,9 @@ bool ContactResponse::update(const CoupledSystem& system, const IslandVelocities
     const bool entered = !released && checkEnd(solved, y, round);
     // Friction follows the normal impulses only when these have settled: lagged behind a passing one it runs away.
     const bool slid = !released && !entered && updateFriction(system);
-    return (released || entered || slid) && round + 1 < kMaxRounds;
+    const bool changed = released || entered || slid;
+    if (changed && round + 2 == kMaxRounds) dropExcessFriction();
+    return changed && round + 1 < kMaxRounds;
 }
 
 void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelocities& solved) {
@@ -490,6 +494,18 @@ bool ContactResponse::updateFriction(const CoupledSystem& system) {
     return changed;
 }
 
+/// Where contacts have not settled before the last solve, none may hold a body by more friction than there is: a light
+/// one would be thrown aside.
+void ContactResponse::dropExcessFriction() {
+    for (Touch& touch : m_touches) {
+        const double force = (touch.impulse - touch.normalImpulse * touch.contact.normal).norm();
+        const double limit = touch.contact.friction * std::max(touch.normalImpulse, 0.0);
+        if (!touch.active || force <= kMostFriction * limit) continue;
+        touch.sticks = false;
+        touch.slip = {};
+    }
+}
+
 /// A contact slides once more holds it than friction can. `matters`: change of impulse that is worth another solve
 /// [N s]; `stiffness`: impulse over velocity of its vertices [kg].
 bool ContactResponse::updateSticking(Touch& touch, double matters, double stiffness) const {
@@ -526,6 +542,9 @@ bool ContactResponse::updateSliding(Touch& touch, double matters) const {
     }
     const bool damped = turns || touch.flips >= kMostFlips || slip.speed == 0.0;
     slip.direction = damped ? Vec3::Zero() : Vec3(touch.slide / slip.speed);
+    if (damped) slip.speed = std::max(slip.speed, old.speed);
+    const double force = (touch.impulse - touch.normalImpulse * touch.contact.normal).norm();
+    if (force > kMostFriction * slip.limit + matters) return true;  // it slid much faster than was foreseen
     return (slip.limit * slip.direction - (old.known ? old.limit : 0.0) * old.direction).norm() > matters;
 }
 
@@ -556,13 +575,25 @@ bool ContactResponse::checkEnd(const IslandVelocities& solved, const Points& y, 
     return changed && round + 1 < kMaxRounds;
 }
 
+/// The touch that a contact belongs to, -1: none. A point that has moved on to a neighbouring face is still the same.
+int ContactResponse::touchOf(const Contact& contact) const {
+    if (const auto known = m_index.find(keyOf(contact)); known != m_index.end()) return known->second;
+    if (contact.isVertex()) return -1;
+    for (std::size_t i = 0; i < m_touches.size(); ++i) {
+        const Contact& other = m_touches[i].contact;
+        if (m_touches[i].isRow && !other.isVertex() && other.shell == contact.shell && other.body == contact.body &&
+            (other.point - contact.point).norm() < kSamePoint * m_edge[contact.shell])
+            return static_cast<int>(i);
+    }
+    return -1;
+}
+
 bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round) {
-    const auto known = m_index.find(keyOf(contact));
-    const bool fresh = known == m_index.end();
-    const bool held = !fresh && m_touches[known->second].active;
+    const int known = touchOf(contact);
+    const bool fresh = known < 0;
+    const bool held = !fresh && m_touches[known].active;
     const double slop = contact.isVertex() ? m_vertexSlop : m_faceSlop;
-    const double missing =
-        fresh ? contact.gap : contact.gap - m_touches[known->second].offset - m_touches[known->second].allowedGap;
+    const double missing = fresh ? contact.gap : contact.gap - m_touches[known].offset - m_touches[known].allowedGap;
     if (missing > -slop) return false;
     if (!contact.isVertex() && !held) {
         // Nearly at a vertex, that says the same; and of features that share vertices the deepest comes first, for the
@@ -580,7 +611,7 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
         m_index[keyOf(contact)] = static_cast<int>(m_touches.size());
         m_touches.push_back(makeTouch(contact));
     }
-    Touch& touch = fresh ? m_touches.back() : m_touches[known->second];
+    Touch& touch = fresh ? m_touches.back() : m_touches[known];
     if (!touch.active) {
         if (touch.changes >= kMostChanges) return false;
         touch.active = true;

@@ -115,10 +115,12 @@ class ContactResponse {
     bool releasePulling(int round);
     void addFriction(const Touch& touch, Mat3& damping, Vec3& load) const;
     bool updateFriction(const CoupledSystem& system);
+    void dropExcessFriction();
     bool updateSticking(Touch& touch, double matters, double stiffness) const;
     bool updateSliding(Touch& touch, double matters) const;
     double slowest() const { return 1e-3 * m_input.h * std::max(m_input.gravity.norm(), 1e-3); }
     bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
+    int touchOf(const Contact& contact) const;
     bool closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round);
     bool liftVertices(const Contact& contact, double by);
     int globalVertex(const Contact& c, int corner) const { return m_offsets[c.shell] + c.vertices[corner]; }
