@@ -372,11 +372,14 @@ struct Island {
         VertexConstraint c{.vertex = vertex, .body = body};
         c.free = frame.rightCols(3 - held) * frame.rightCols(3 - held).transpose();
         c.z = frame.leftCols(held) * test::randomVector(random, 1.0).head(held);
-        c.damping = drag * c.free;
         if (body >= 0)
             c.arm = test::randomVector(random, 1.0);
         else
             c.carried = test::randomVector(random, 1.0);
+        if (drag > 0.0) {  // slides over the body, with friction
+            c.tie = Mat3::Identity() - c.free;
+            rows.push_back({{vertex, vertex, vertex}, Vec3::UnitX(), body, c.arm, c.carried, drag * c.free});
+        }
         constraints.push_back(c);
     }
 
@@ -472,8 +475,6 @@ struct DenseIsland {
     void addConstraint(const VertexConstraint& constraint) {
         const int i = constraint.vertex;
         const Dense B = relative({i, i, i}, Vec3::UnitX(), constraint.body, constraint.arm);
-        H += B.transpose() * constraint.damping * B;
-        g += B.transpose() * constraint.damping * constraint.carried;
         const Mat3 held = Mat3::Identity() - constraint.free;
         const Eigen::SelfAdjointEigenSolver<Mat3> eigen(held);
         for (int k = 0; k < 3; ++k) {

@@ -321,7 +321,7 @@ void ContactResponse::writeTo(CoupledSystem& system) {
         touch.isRow = touch.active && !joinFilter(static_cast<int>(i), constraints);
         if (touch.isRow) rows.push_back(makeRow(touch, system));
     }
-    for (const auto& filter : m_filters) finishFilter(filter, constraints[filter.constraint]);
+    for (auto& filter : m_filters) finishFilter(filter, constraints[filter.constraint], rows);
     system.setContacts(std::move(constraints), std::move(rows));
 }
 
@@ -347,7 +347,8 @@ bool ContactResponse::joinFilter(int index, std::vector<VertexConstraint>& const
     return true;
 }
 
-void ContactResponse::finishFilter(const VertexFilter& filter, VertexConstraint& constraint) const {
+void ContactResponse::finishFilter(VertexFilter& filter, VertexConstraint& constraint,
+                                   std::vector<SoftRow>& rows) const {
     const Touch& first = m_touches[filter.touches[0]];
     Mat3 held = Mat3::Zero();
     for (int k = 0; k < filter.count; ++k) {
@@ -365,9 +366,15 @@ void ContactResponse::finishFilter(const VertexFilter& filter, VertexConstraint&
         return;
     }
     constraint.free = Mat3::Identity() - held;
-    for (int k = 0; k < filter.count; ++k)
-        addFriction(m_touches[filter.touches[k]], constraint.damping, constraint.load);
-    constraint.damping = (constraint.free * constraint.damping * constraint.free).eval();
+    constraint.tie = held;
+    const int v = constraint.vertex;
+    SoftRow friction{{v, v, v}, Vec3::UnitX(), constraint.body, constraint.arm, constraint.carried};
+    for (int k = 0; k < filter.count; ++k) addFriction(m_touches[filter.touches[k]], friction.stiffness, friction.load);
+    friction.stiffness = (constraint.free * friction.stiffness * constraint.free).eval();
+    friction.load = (constraint.free * friction.load).eval();
+    if (friction.stiffness.isZero(0.0) && friction.load.isZero(0.0)) return;
+    filter.friction = static_cast<int>(rows.size());
+    rows.push_back(friction);
 }
 
 /// Coulomb's law about the last solve's sliding velocity s, with t = s / |s| and T the tangent plane:
@@ -457,7 +464,9 @@ void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelo
             touch.normalImpulse = along[k];
             touch.impulse = along[k] * touch.contact.normal;
         }
-        m_touches[filter.touches[0]].impulse += total - normals * along;  // friction
+        Vec3& friction = m_touches[filter.touches[0]].impulse;
+        friction += total - normals * along;
+        if (filter.friction >= 0) friction += system.rowImpulse(system.rows()[filter.friction], solved.v, solved.w);
     }
 }
 

@@ -89,6 +89,7 @@ class ContactResponse {
         int constraint;  ///< index in the system
         int count = 0;
         std::array<int, 3> touches{};
+        int friction = -1;  ///< its soft row in the system, where it slides
     };
 
     Key keyOf(const Contact& c) const;
@@ -108,7 +109,7 @@ class ContactResponse {
     void alter(Touch& touch, Points& y) const;
     std::vector<VertexConstraint> holdConstraints() const;
     bool joinFilter(int touch, std::vector<VertexConstraint>& constraints);
-    void finishFilter(const VertexFilter& filter, VertexConstraint& constraint) const;
+    void finishFilter(VertexFilter& filter, VertexConstraint& constraint, std::vector<SoftRow>& rows) const;
     SoftRow makeRow(Touch& touch, const CoupledSystem& system) const;
     double vertexStiffness(const CoupledSystem& system, const Touch& touch) const;
     void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);

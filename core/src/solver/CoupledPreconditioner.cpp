@@ -68,7 +68,7 @@ void CoupledPreconditioner::filterBlocks(const CoupledSystem& system, const Coup
         const VertexConstraint* ci = free(i);
         if (ci) {
             const double scale = m_diagonal[i].trace() / 3.0;
-            const Mat3 filtered = ci->free * (m_diagonal[i] + ci->damping) * ci->free;
+            const Mat3 filtered = ci->free * m_diagonal[i] * ci->free;
             m_diagonal[i] = filtered + scale * (Mat3::Identity() - ci->free);
         }
         if (m_lower.empty()) continue;
@@ -86,11 +86,11 @@ void CoupledPreconditioner::updateBodies(const CoupledSystem& system) {
         for (int i = 0; i < part.matrix->size(); ++i) {
             const VertexConstraint* ci = system.constraintOf(i + part.offset);
             if (!ci || ci->body < 0) continue;
-            blocks[ci->body] += pointStiffness(part.matrix->diagonal()[i], ci->arm);
+            blocks[ci->body] += pointStiffness(ci->tie * part.matrix->diagonal()[i] * ci->tie, ci->arm);
             for (int k = part.matrix->rowBegin(i); k < part.matrix->rowEnd(i); ++k) {
                 const VertexConstraint* cj = system.constraintOf(part.matrix->column(k) + part.offset);
                 if (!cj || cj->body != ci->body) continue;
-                const Mat6 block = pointStiffness(part.matrix->lower()[k], ci->arm, cj->arm);
+                const Mat6 block = pointStiffness(ci->tie * part.matrix->lower()[k] * cj->tie, ci->arm, cj->arm);
                 blocks[ci->body] += block + block.transpose();
             }
         }

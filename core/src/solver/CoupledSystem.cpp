@@ -51,17 +51,18 @@ void CoupledSystem::start(const Points& v, const Eigen::Matrix<double, 6, Eigen:
     u.s = v;
     u.w = w;
     for (const auto& c : m_constraints) {
-        Vec3 s = v.col(c.vertex) - c.carried;
-        if (c.body >= 0) s -= pointVelocity(w.col(c.body), c.arm);
-        u.s.col(c.vertex) = c.free * s + c.z;
+        Vec3 moved = c.carried;
+        if (c.body >= 0) moved += pointVelocity(w.col(c.body), c.arm);
+        u.s.col(c.vertex) = c.free * (v.col(c.vertex) - c.tie * moved) + c.z;
     }
 }
 
 void CoupledSystem::velocities(const CoupledVector& u, Points& v) const {
     v = u.s;
     for (const auto& c : m_constraints) {
-        v.col(c.vertex) += c.carried;
-        if (c.body >= 0) v.col(c.vertex) += pointVelocity(u.w.col(c.body), c.arm);
+        Vec3 moved = c.carried;
+        if (c.body >= 0) moved += pointVelocity(u.w.col(c.body), c.arm);
+        v.col(c.vertex) += c.tie * moved;
     }
 }
 
@@ -95,7 +96,7 @@ void CoupledSystem::momentum(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w,
 void CoupledSystem::apply(const CoupledVector& u, CoupledVector& q) const {
     m_v = u.s;
     for (const auto& c : m_constraints)
-        if (c.body >= 0) m_v.col(c.vertex) += pointVelocity(u.w.col(c.body), c.arm);
+        if (c.body >= 0) m_v.col(c.vertex) += c.tie * pointVelocity(u.w.col(c.body), c.arm);
     multiply(m_v, m_q);
     momentum(u.w, q.w);
     for (const auto& row : m_rows) {
@@ -109,8 +110,8 @@ void CoupledSystem::apply(const CoupledVector& u, CoupledVector& q) const {
     q.s = m_q;
     for (const auto& c : m_constraints) {
         const Vec3 f = m_q.col(c.vertex);
-        if (c.body >= 0) q.w.col(c.body) += pointImpulse(f, c.arm);
-        q.s.col(c.vertex) = c.free * (f + c.damping * u.s.col(c.vertex));
+        if (c.body >= 0) q.w.col(c.body) += pointImpulse(c.tie * f, c.arm);
+        q.s.col(c.vertex) = c.free * f;
     }
 }
 
@@ -132,8 +133,8 @@ void CoupledSystem::residual(const CoupledVector& u, CoupledVector& r, Points& u
     r.s = unfiltered;
     for (const auto& c : m_constraints) {
         const Vec3 f = unfiltered.col(c.vertex);
-        if (c.body >= 0) r.w.col(c.body) += pointImpulse(f, c.arm);
-        r.s.col(c.vertex) = c.free * (f + c.load - c.damping * u.s.col(c.vertex));
+        if (c.body >= 0) r.w.col(c.body) += pointImpulse(c.tie * f, c.arm);
+        r.s.col(c.vertex) = c.free * f;
     }
 }
 

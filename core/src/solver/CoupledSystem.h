@@ -22,7 +22,9 @@ struct CoupledVector {
 };
 
 /// The modified filter of one vertex (Ascher & Boxerman 2003), relative to what it touches:
-/// v = s + G w_b + carried, S s free, (I - S) s = z.
+/// v = s + T (G w_b + carried), S s free, (I - S) s = z. T is I where the vertex moves with the body, and I - S where
+/// it slides over it: only in the constrained directions are its velocities then relative to the body, or a light body
+/// would be as hard to solve for as the vertices are heavy.
 struct VertexConstraint {
     int vertex;                   ///< in the island's numbering
     int body = -1;                ///< dynamic body, or -1: the world, or a body of prescribed motion
@@ -30,8 +32,7 @@ struct VertexConstraint {
     Vec3 z = Vec3::Zero();        ///< prescribed part of s [m/s]
     Vec3 arm = Vec3::Zero();      ///< vertex minus centre of mass [m]
     Vec3 carried = Vec3::Zero();  ///< surface velocity of a prescribed body [m/s]
-    Mat3 damping = Mat3::Zero();  ///< friction as a damping of s [kg]
-    Vec3 load = Vec3::Zero();     ///< friction that does not depend on s: an impulse on the vertex [N s]
+    Mat3 tie = Mat3::Identity();  ///< T
 };
 
 /// An implicit soft row on the velocity u of a shell's point relative to a body: adds 1/2 u.(stiffness u) - load.u.
