@@ -420,6 +420,96 @@ TEST(MultiBody, AMotorPressesWithItsForce) {
     EXPECT_NEAR(double(collider.getWorldTransform().getOrigin().y()), 0.01 + 2 * sheet.contactThickness(), 5e-4);
 }
 
+/// A palm on a fixed rail carries two fingers, which close from above and below on the edge of a sheet on a table.
+class Gripper {
+  public:
+    static constexpr double kStep = 1.0 / 240;
+    enum Link { kPalm, kLower, kUpper };
+
+    Gripper() {
+        addTable();
+        addHand();
+        ShellMaterial felt{.thickness = 1e-3, .massDamping = 1.0};
+        felt.stretchStiffnessOverride = 5e3;
+        felt.bendingStiffnessOverride = 2e-3;
+        felt.areaDensityOverride = 0.3;
+        TriangleMesh mesh = makeGrid({.size = {0.2, 0.15}, .cells = {16, 12}});
+        mesh.positions.row(0).array() -= 0.03;  // 7 cm beyond the table's edge at x = 0
+        mesh.positions.row(1).array() += 1e-3;
+        sheet = &scene.shells->add(mesh, felt, {.tolerance = 1e-5, .friction = 0.9});
+    }
+
+    void addTable() {
+        auto& box = scene.addShape(std::make_unique<btBoxShape>(vector(0.2, 0.1, 0.25)));
+        auto table = std::make_unique<btCollisionObject>();
+        table->setCollisionShape(&box);
+        table->setWorldTransform(btTransform(btQuaternion::getIdentity(), vector(-0.2, -0.1, 0)));
+        scene.world.addCollisionObject(table.get());
+        scene.objects.push_back(std::move(table));
+    }
+
+    void addHand() {
+        hand = &scene.addMultiBody(3, 0, btVector3(0, 0, 0), true);
+        const btQuaternion straight = btQuaternion::getIdentity();
+        const btVector3 up(0, 1, 0), none(0, 0, 0), inertia = vector(1e-4, 1e-4, 1e-4);
+        hand->setupPrismatic(kPalm, btScalar(0.5), inertia, -1, straight, up, vector(0.16, 0, 0), none, true);
+        hand->setupPrismatic(kLower, btScalar(0.1), inertia, kPalm, straight, up, vector(-0.12, -0.034, 0), none, true);
+        hand->setupPrismatic(kUpper, btScalar(0.1), inertia, kPalm, straight, up, vector(-0.12, 0.034, 0), none, true);
+        scene.finish(*hand);
+        auto& finger = scene.addShape(std::make_unique<btBoxShape>(vector(0.03, 0.006, 0.06)));
+        // Bullet drives no joint of a link without a collider.
+        scene.addCollider(*hand, kPalm, scene.addShape(std::make_unique<btBoxShape>(vector(0.01, 0.05, 0.03))));
+        for (const int link : {kLower, kUpper}) scene.addCollider(*hand, link, finger).setFriction(1);
+        scene.addMotor(*hand, kPalm, 0.0, 14 * kStep);  // lifts the hand gently
+        scene.addMotor(*hand, kLower, 0.1, 60 * kStep);
+        scene.addMotor(*hand, kUpper, -0.1, 12 * kStep);
+    }
+
+    void drive(double palm, double lower, double seconds) {
+        scene.motors[kPalm]->setVelocityTarget(btScalar(palm));
+        scene.motors[kLower]->setVelocityTarget(btScalar(lower));
+        scene.run(seconds, kStep);
+    }
+
+    /// Where a vertex is as seen from the lower finger.
+    Vec3 seenFromFinger(int vertex) const {
+        const btTransform& pose = hand->getLinkCollider(kLower)->getWorldTransform();
+        return sheet->shell().positions().col(vertex) - toVec3(pose.getOrigin());
+    }
+
+    MultiBodyScene scene;
+    btMultiBody* hand = nullptr;
+    ShellBody* sheet = nullptr;
+};
+
+TEST(MultiBody, TwoFingersLiftASheetAndHoldIt) {
+    Gripper gripper;
+    gripper.drive(0.0, 0.1, 0.27);
+    gripper.drive(0.0, 0.0, 0.13);
+    const ShellBody& sheet = *gripper.sheet;
+    std::vector<int> gripped;
+    std::vector<Vec3> start;
+    for (int i = 0; i < sheet.vertexCount(); ++i) {
+        const Vec3 x = sheet.shell().positions().col(i);
+        if (x.x() < 0.02 || x.x() > 0.06 || std::abs(x.z()) > 0.05) continue;
+        gripped.push_back(i);
+        start.push_back(gripper.seenFromFinger(i));
+    }
+    ASSERT_GT(gripped.size(), 10u);
+    gripper.drive(0.4, 0.0, 0.45);
+    gripper.drive(0.0, 0.0, 0.4);
+    double slip = 0.0;
+    for (std::size_t k = 0; k < gripped.size(); ++k)
+        slip = std::max(slip, (gripper.seenFromFinger(gripped[k]) - start[k]).norm());
+    RecordProperty("slip_mm", std::to_string(1e3 * slip));
+    EXPECT_LT(slip, 2e-3);
+    EXPECT_GT(sheet.shell().positions().row(1).minCoeff(), 0.0);  // off the table
+    double grip = 0.0;
+    for (const auto& contact : sheet.contacts())
+        if (contact.contact.normal.y() < -0.9) grip -= contact.impulse.y() / Gripper::kStep;
+    EXPECT_NEAR(grip, 12.0 + 0.1 * 9.81, 0.5);  // the motor's force and the finger's weight
+}
+
 TEST(MultiBody, ALinkMayBeRemovedWhileItTouches) {
     MultiBodyScene scene;
     btMultiBody& pendulum = scene.addPendulum(0.2, 0.5, vector(-0.4, 0.3, 0), 0.4);
