@@ -97,7 +97,7 @@ TEST_F(SceneTest, LinksOfMultiBodiesAreBodies) {
 
 TEST_F(SceneTest, MistakesInMultiBodiesAreNamed) {
     const std::pair<const char*, const char*> cases[] = {
-        {"multibodies.0.link=1", "multibodies.0: unknown key \"link\"; did you mean \"links\"?"},
+        {"multibodies.0.link=1", "multibodies.0.link: unknown key \"link\"; did you mean \"links\"?"},
         {"multibodies.arm.links.slide.motr=1", "unknown key \"motr\"; did you mean \"motor\"?"},
         {"multibodies.0.links.1.parent=slid", "has the unknown value \"slid\"; did you mean \"slide\"?"},
         {"multibodies.0.links.0.parent=hand", "multibodies.0.links.0.parent has the unknown value"},  // comes later
