@@ -719,7 +719,7 @@ TEST(ContactStepTest, ImpulsesPushAndStayInTheFrictionCone) {
     Scene scene = dropScene(0.3);
     scene.shell.setVelocities(Vec3(1.0, 0, 0).replicate(1, scene.shell.vertexCount()));
     for (int k = 0; k < 60; ++k)
-        for (const auto& [contact, impulse, sticks] : scene.step().contacts) {
+        for (const auto& [contact, impulse, sticks, slip] : scene.step().contacts) {
             const double normal = impulse.dot(contact.normal);
             EXPECT_GE(normal, -1e-6);
             EXPECT_LE((impulse - normal * contact.normal).norm(), 0.33 * normal + 1e-6) << "step " << k;
