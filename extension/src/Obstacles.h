@@ -63,6 +63,11 @@ class Obstacles {
     bool m_gravityIsNoForce = false;
 };
 
+/// Whether an object never moves. Kinematic bodies are usually static as well: Bullet marks all of mass 0.
+inline bool standsStill(const btCollisionObject& object) {
+    return object.isStaticObject() && !object.isKinematicObject();
+}
+
 /// Pose after moving with a twist for a time: rotation by the exponential of the angular velocity.
 Frame moved(const Frame& start, const Vec6& twist, double time);
 

@@ -57,7 +57,7 @@ double fastestObject(const btCollisionWorld& world) {
     double speed = 0.0;
     const auto& objects = world.getCollisionObjectArray();
     for (int i = 0; i < objects.size(); ++i) {
-        if (!objects[i]->isStaticObject() && objects[i]->isActive()) speed = std::max(speed, speedOf(*objects[i]));
+        if (!standsStill(*objects[i]) && objects[i]->isActive()) speed = std::max(speed, speedOf(*objects[i]));
     }
     return speed;
 }
@@ -226,7 +226,7 @@ void ShellWorld::moveShells(btCollisionWorld& world, double h) {
     for (const auto& shell : m_shells)
         if (shell->m_hasVelocity && !shell->isAsleep()) shell->m_shell.advance(h);
     for (const CarriedVertex& c : m_impl->carried) {
-        if (idOf(world, c.object) != c.objectId) continue;
+        if (idOf(world, c.object) != c.objectId || m_shells[c.shell]->isAsleep()) continue;
         Shell& shell = m_shells[c.shell]->m_shell;
         const Vec3 assumed = shell.positions().col(c.vertex);
         const Vec3 local = c.anchor ? *c.anchor : moved(c.start, c.twist, h).inverse(Eigen::Isometry) * assumed;
@@ -295,7 +295,7 @@ void ShellWorld::accept(Island& island, const StepReport& report, const std::vec
 void ShellWorld::carry(const ShellBody& shell, int vertex, const Island& island, int body,
                        const std::vector<CoupledBody>& coupled, const Vec3* anchor) {
     const Obstacle& obstacle = island.obstacles[body];
-    if (obstacle.object->isStaticObject() && !anchor) return;
+    if (standsStill(*obstacle.object) && !anchor) return;
     std::optional<Vec3> local;
     if (anchor) local = obstacle.start.inverse(Eigen::Isometry) * *anchor;
     const auto index = std::find_if(m_shells.begin(), m_shells.end(), [&](const auto& s) { return s.get() == &shell; });

@@ -115,7 +115,7 @@ void Sleepers::wakeTouched(double h) {
         for (const int k : {0, 1}) {
             if (objects[k]->getInternalType() != btCollisionObject::CO_USER_TYPE) continue;
             btCollisionObject& other = *objects[1 - k];
-            if (other.isStaticObject() || !other.isActive() || !other.hasContactResponse()) continue;
+            if (standsStill(other) || !other.isActive() || !other.hasContactResponse()) continue;
             ShellBody* shell = asleep(objects[k]);
             if (shell && shell->m_proxy->mayTouch(other) && touches(*shell, other, h)) wakeUp(*shell);
         }

@@ -1,0 +1,181 @@
+// Shells fall asleep with what they lie on and carry, cost nothing then, and wake up when something happens to them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "support/BulletScene.h"
+
+namespace jacket::bullet::testing {
+namespace {
+
+using jacket::testing::Scene;
+
+constexpr double kStep = 1.0 / 60;
+
+TriangleMesh sheetAt(double side, int cells, double height) {
+    TriangleMesh mesh = squareSheet(side, cells);
+    mesh.positions.row(1).array() += height;
+    return mesh;
+}
+
+/// Runs until a shell sleeps; the time that took [s], or -1 if it did not within `limit`.
+double timeToSleep(Scene<>& scene, const ShellBody& shell, double limit) {
+    for (double t = 0; t < limit; t += kStep) {
+        scene.step(kStep);
+        if (shell.isAsleep()) return t;
+    }
+    return -1.0;
+}
+
+/// A cloth of 0.6 m on a kinematic table, with a pile of two boxes on it; everything is asleep.
+struct SleepingPile : Scene<> {
+    btRigidBody& table;
+    ShellBody& cloth;
+    btRigidBody& lower;
+    btRigidBody& upper;
+
+    SleepingPile()
+        : table(addBox(btVector3(1, btScalar(0.1), 1), 0, btVector3(0, btScalar(-0.1), 0))),
+          cloth(shells->add(sheetAt(0.6, 8, 2e-4), trampolineCloth())),
+          lower(addBox(btVector3(btScalar(0.1), btScalar(0.1), btScalar(0.1)), 0.5, btVector3(0, btScalar(0.101), 0))),
+          upper(addBox(btVector3(btScalar(0.1), btScalar(0.1), btScalar(0.1)), 0.5, btVector3(0, btScalar(0.302), 0))) {
+        table.setCollisionFlags(table.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+        seconds = timeToSleep(*this, cloth, 6.0);
+    }
+    double seconds;
+};
+
+TEST(Sleeping, ASheetOnTheFloorFallsAsleep) {
+    Scene scene;
+    scene.addFloor();
+    auto& sheet = scene.shells->add(sheetAt(0.6, 8, 0.02), trampolineCloth());
+    const double seconds = timeToSleep(scene, sheet, 4.0);
+    EXPECT_GT(seconds, double(gDeactivationTime) - kStep);
+    scene.step(kStep);
+    EXPECT_EQ(scene.shells->lastStep().awake, 0);
+    EXPECT_EQ(sheet.shell().velocities().norm(), 0.0);
+}
+
+TEST(Sleeping, APileOfBoxesSleepsWithTheClothUnderIt) {
+    SleepingPile scene;
+    ASSERT_GT(scene.seconds, 0.0);
+    const Points asleep = scene.cloth.shell().positions();
+    const btScalar height = scene.upper.getWorldTransform().getOrigin().y();
+    scene.run(2.0, kStep);
+    EXPECT_TRUE(scene.cloth.isAsleep());
+    EXPECT_EQ(scene.shells->lastStep().awake, 0);
+    EXPECT_EQ(scene.shells->lastStep().solves, 0);
+    EXPECT_EQ(scene.lower.getActivationState(), ISLAND_SLEEPING);
+    EXPECT_EQ(scene.upper.getActivationState(), ISLAND_SLEEPING);
+    EXPECT_EQ(asleep, scene.cloth.shell().positions());
+    EXPECT_EQ(height, scene.upper.getWorldTransform().getOrigin().y());
+}
+
+/// What happens to a sleeping pile, and that this wakes the cloth.
+struct Alarm {
+    const char* name;
+    std::function<void(SleepingPile&)> ring;
+};
+void PrintTo(const Alarm& alarm, std::ostream* out) {
+    *out << alarm.name;
+}
+class Waking : public ::testing::TestWithParam<Alarm> {};
+
+TEST_P(Waking, WakesTheCloth) {
+    SleepingPile scene;
+    ASSERT_TRUE(scene.cloth.isAsleep());
+    GetParam().ring(scene);
+    bool woke = false;
+    for (int i = 0; i < 30 && !woke; ++i) {
+        scene.step(kStep);
+        woke = !scene.cloth.isAsleep();
+    }
+    EXPECT_TRUE(woke);
+    EXPECT_EQ(scene.shells->lastStep().awake, 1);
+}
+
+void throwBall(SleepingPile& scene) {
+    auto& ball = scene.addSphere(0.05, 0.1, btVector3(btScalar(0.22), btScalar(0.5), btScalar(0.22)));
+    ball.setLinearVelocity(btVector3(0, -3, 0));
+}
+void blow(SleepingPile& scene) {
+    Wind wind;
+    wind.velocity = Vec3(0, 0, 5);
+    scene.shells->setWind(wind);
+}
+void moveTable(SleepingPile& scene) {
+    btTransform pose = scene.table.getWorldTransform();
+    pose.setOrigin(pose.getOrigin() + btVector3(0, btScalar(0.01), 0));
+    scene.table.activate(true);
+    scene.table.setWorldTransform(pose);
+}
+void setForce(SleepingPile& scene) {
+    scene.cloth.shell().setForce(0, Vec3(0, 0.1, 0));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Alarms, Waking,
+    ::testing::Values(Alarm{"ball", throwBall}, Alarm{"wind", blow}, Alarm{"table", moveTable},
+                      Alarm{"force", setForce}, Alarm{"removed_support", [](SleepingPile& s) { s.remove(s.table); }},
+                      Alarm{"removed_load", [](SleepingPile& s) { s.remove(s.lower); }},
+                      Alarm{"pin", [](SleepingPile& s) { s.cloth.pin(0); }},
+                      Alarm{"activate", [](SleepingPile& s) { s.cloth.activate(); }},
+                      Alarm{"gravity", [](SleepingPile& s) { s.world.setGravity(btVector3(0, -5, 0)); }},
+                      Alarm{"load_woken",
+                            [](SleepingPile& s) {
+                                s.upper.activate(true);
+                                s.upper.setLinearVelocity(btVector3(1, 0, 0));
+                            }}),
+    [](const auto& alarm) { return std::string(alarm.param.name); });
+
+TEST(Sleeping, AMovedPinWakesAHangingSheet) {
+    Scene scene;
+    ShellMaterial damped = trampolineCloth();
+    damped.massDamping = 5.0;
+    auto& sheet = scene.shells->add(squareSheet(0.6, 6), damped);
+    pinBorder(sheet);
+    ASSERT_GT(timeToSleep(scene, sheet, 10.0), 0.0);
+    sheet.movePin(0, sheet.positions()[0] + btVector3(0, btScalar(0.01), 0));
+    scene.run(2 * kStep, kStep);  // solved in the first, moved in the second
+    EXPECT_FALSE(sheet.isAsleep());
+    EXPECT_NEAR(sheet.positions()[0].y(), 0.01, bulletTolerance(1e-9, 1e-6));
+}
+
+/// From below, where it meets nothing but the sheet.
+TEST(Sleeping, AKinematicBodyThatComesWakesIt) {
+    Scene scene;
+    auto& lifter = scene.addSphere(0.1, 0, btVector3(0, btScalar(-0.3), 0));
+    lifter.setCollisionFlags(lifter.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+    ShellMaterial damped = trampolineCloth();
+    damped.massDamping = 5.0;
+    auto& sheet = scene.shells->add(squareSheet(0.6, 6), damped);
+    pinBorder(sheet);
+    ASSERT_GT(timeToSleep(scene, sheet, 10.0), 0.0);
+    const double before = sheet.shell().positions().row(1).maxCoeff();
+    for (int i = 1; i <= 30; ++i) {
+        btTransform pose = lifter.getWorldTransform();
+        pose.setOrigin(btVector3(0, btScalar(-0.3 + 0.25 * i / 30), 0));
+        lifter.activate(true);
+        lifter.setWorldTransform(pose);
+        scene.step(kStep);
+    }
+    EXPECT_FALSE(sheet.isAsleep());
+    EXPECT_GT(sheet.shell().positions().row(1).maxCoeff(), before + 0.04);
+}
+
+TEST(Sleeping, SwitchedOffItNeverHappens) {
+    Scene scene;
+    scene.addFloor();
+    auto& sheet = scene.shells->add(sheetAt(0.6, 8, 2e-4), trampolineCloth(), {.sleeping = false});
+    auto& box =
+        scene.addBox(btVector3(btScalar(0.1), btScalar(0.1), btScalar(0.1)), 0.5, btVector3(0, btScalar(0.11), 0));
+    EXPECT_LT(timeToSleep(scene, sheet, 3.0 * double(gDeactivationTime)), 0.0);
+    EXPECT_EQ(scene.shells->lastStep().awake, 1);
+    EXPECT_TRUE(box.isActive());  // it is kept awake with the sheet that carries it
+}
+
+}  // namespace
+}  // namespace jacket::bullet::testing
