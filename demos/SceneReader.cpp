@@ -406,7 +406,8 @@ BodyDescription readBody(ObjectReader in, const fs::path& folder, std::size_t in
 BodyDescription readJointedBody(ObjectReader& in, const fs::path& folder) {
     BodyDescription body;
     body.label = in.label();
-    body.shape = readShape(in.object("shape"), folder);
+    ObjectReader shape = in.object("shape");
+    body.shape = readShape(shape, folder);
     if (std::holds_alternative<Plane>(body.shape)) in.fail("shape", "is a plane, which cannot be jointed");
     body.transform.position = in.vector("position", Vec3::Zero());
     body.friction = in.number("friction", Range::nonNegative(), body.friction);
