@@ -27,7 +27,8 @@ Json shellsToJson(const World& world) {
         shells.push_back({{"name", world.scene().shells[k].name},
                           {"vertices", world.shell(k).vertexCount()},
                           {"triangles", world.shell(k).mesh().triangleCount()},
-                          {"contacts", world.contactCount(k)}});
+                          {"contacts", world.contactCount(k)},
+                          {"asleep", world.isAsleep(k)}});
     return shells;
 }
 
@@ -110,6 +111,7 @@ Json Result::json(const World& end) const {
     result["converged"] = m_converged;
     result["finite"] = m_finite;
     result["rejected_steps"] = end.rejectedSteps();
+    result["passed_steps"] = end.passedSteps();
     result["shells"] = shellsToJson(end);
     for (std::size_t k = 0; k < m_yielding.size(); ++k) {
         const auto& [most, time] = m_yielding[k];

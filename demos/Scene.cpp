@@ -55,4 +55,8 @@ bool Scene::usesSeed() const {
     return std::any_of(shells.begin(), shells.end(), [](const auto& shell) { return shell.perturbation > 0; });
 }
 
+bool Scene::maySleep() const {
+    return std::any_of(shells.begin(), shells.end(), [](const auto& shell) { return shell.sleeping; });
+}
+
 }  // namespace jacket::demo

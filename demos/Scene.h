@@ -81,6 +81,7 @@ struct ShellDescription {
     Integrator integrator = Integrator::BackwardEuler;
     bool plasticity = false;   ///< keep bends and stretches beyond the yield stress
     bool flattenRest = false;  ///< bending forgets the curvature of the mesh
+    bool sleeping = false;     ///< it may fall asleep; figures of a scene do not depend on it unless they ask to
     std::vector<Region> regions;
     std::vector<Selection> pins;
     std::vector<Clamp> clamps;
@@ -169,6 +170,7 @@ struct Scene {
 
     int frames() const;  ///< fewest that cover `seconds`
     bool usesSeed() const;
+    bool maySleep() const;  ///< bodies may if a shell may
 };
 
 /// Where relative file names in a scene are looked for.

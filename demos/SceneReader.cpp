@@ -39,7 +39,8 @@ constexpr std::array kShellKeys{"name",
                                 "integrator",
                                 "contact_thickness",
                                 "perturbation",
-                                "self_collision"};
+                                "self_collision",
+                                "sleeping"};
 constexpr std::array kBodyKeys{
     "name", "shape", "mass", "position", "rotation_deg", "velocity", "angular_velocity", "friction", "kinematic"};
 constexpr std::array kMultiBodyKeys{"name", "base", "links"};
@@ -306,6 +307,7 @@ ShellDescription readShell(ObjectReader in, const fs::path& folder, std::size_t 
     shell.pressure = in.number("pressure", Range::any("Pa"), shell.pressure);
     shell.initialVelocity = in.vector("initial_velocity", Vec3::Zero());
     shell.perturbation = in.number("perturbation", Range::nonNegative("m"), shell.perturbation);
+    shell.sleeping = in.flag("sleeping", shell.sleeping);
     readNotYet(in);
     return shell;
 }

@@ -114,6 +114,7 @@ Json toJson(const ShellDescription& shell) {
     json["pressure"] = shell.pressure;
     json["initial_velocity"] = demo::toJson(shell.initialVelocity);
     json["perturbation"] = shell.perturbation;
+    json["sleeping"] = shell.sleeping;
     return json;
 }
 

@@ -241,7 +241,9 @@ struct World::Impl {
         info.m_friction = btScalar(description.friction);
         info.m_startWorldTransform = toBullet(description.transform) * entry.centre;
         entry.body = decltype(entry.body)(new btRigidBody(info), RemoveBody{world.get()});
-        entry.body->setActivationState(DISABLE_DEACTIVATION);  // Bullet puts bodies to sleep that still swing slowly
+        if (!scene.maySleep() || !description.kinematic.empty())
+            entry.body->setActivationState(
+                DISABLE_DEACTIVATION);  // Bullet puts bodies to sleep that still swing slowly
         entry.body->setLinearVelocity(toBullet(description.velocity));
         entry.body->setAngularVelocity(toBullet(description.angularVelocity));
         if (!description.kinematic.empty())
@@ -280,6 +282,7 @@ struct World::Impl {
         options.contactThickness = description.contactThickness;
         options.integrator = description.integrator;
         options.plasticity = description.plasticity;
+        options.sleeping = description.sleeping;
         const Points start = startPositions(description, mesh);
         for (const Region& region : description.regions)
             options.regions.push_back({region.material, trianglesIn(region, mesh, start)});
@@ -472,6 +475,12 @@ int World::contactCount(int shell) const {
 }
 int World::rejectedSteps() const {
     return m_impl->shells.lastStep().rejectedSteps;
+}
+int World::passedSteps() const {
+    return m_impl->shells.lastStep().passedSteps;
+}
+bool World::isAsleep(int shell) const {
+    return m_impl->shells[shell].isAsleep();
 }
 std::vector<std::string> World::takeWarnings() {
     return m_impl->shells.takeWarnings();

@@ -52,7 +52,7 @@ TEST(Program, WritesEveryFileAndEveryKeyOfTheResult) {
          {"version",        "scene",           "seed",   "precision",      "threads",        "dt",
           "frames",         "simulated_s",     "wall_s", "ms_per_step",    "pcg_iterations", "max_stretch",
           "peak_stretch",   "max_penetration", "energy", "momentum_error", "converged",      "finite",
-          "rejected_steps", "shells",          "bodies", "probes"})
+          "rejected_steps", "passed_steps",    "shells", "bodies",         "probes"})
         EXPECT_TRUE(result.contains(key)) << key;
     for (const char* key : {"kinetic", "membrane", "bending", "plastic_work", "start", "end"})
         EXPECT_TRUE(result["energy"].contains(key)) << key;

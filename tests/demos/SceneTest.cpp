@@ -63,6 +63,7 @@ TEST_F(SceneTest, WrittenOutItGivesItselfAgain) {
                              "shells.0.material={\"preset\":\"paper\",\"yield\":1e7,\"orthotropy\":{\"weft_young\":2e9,"
                              "\"shear\":1e9,\"warp\":[0,0,1]}}",
                              "shells.0.integrator=bdf2", "shells.0.flatten_rest=true", "load_increments=4",
+                             "shells.0.sleeping=true",
                              "shells.0.clamp=[{\"vertices\":[0,1],\"direction\":[0,0,1]},{\"vertices\":[2,3]}]",
                              "shells.0.guide=[{\"vertices\":[4],\"direction\":[0,1,0]}]",
                              "shells.0.regions=[{\"box\":[[0,0,0],[1,1,1]],\"material\":\"steel\"}]",
@@ -222,6 +223,22 @@ TEST_F(SceneTest, ACompoundTurnsAboutItsCentreOfMass) {
     const auto end = world.bodies()[0];
     EXPECT_LT((end.centre - centre).norm(), 1e-6);
     EXPECT_NEAR(std::atan2(end.rotation(1, 0), end.rotation(0, 0)), 30 * M_PI / 180 + 0.5, 1e-3);
+}
+
+/// A shell sleeps only together with the body that it carries, so this says that the body may sleep, too.
+TEST_F(SceneTest, ShellsAndBodiesSleepOnlyIfTheSceneSaysSo) {
+    const std::vector<std::string> resting{
+        "dt=1/60", "shells.0.pin=[]",
+        "bodies=[{\"shape\":{\"box\":[0.4,0.2,0.4]},\"mass\":2,\"position\":[0,0.102,0]},"
+        "{\"shape\":{\"plane\":[0,1,0,0]}}]",
+        "shells.0.transform={\"position\":[0,0.001,0]}", "shells.0.material=rubber"};
+    for (const bool sleeping : {false, true}) {
+        auto changes = resting;
+        if (sleeping) changes.push_back("shells.0.sleeping=true");
+        World world(load(kScene, changes));
+        for (int i = 0; i < 240; ++i) world.step();
+        EXPECT_EQ(world.isAsleep(0), sleeping);
+    }
 }
 
 TEST_F(SceneTest, WhatIsNotThereYetIsRefused) {
