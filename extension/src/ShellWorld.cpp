@@ -167,8 +167,8 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     followGravity(double(h));
     std::vector<ShellBody*> all;
     for (const auto& shell : m_shells) all.push_back(shell.get());
+    FastBodies fast(*world, m_impl->obstacles, all, m_impl->solved, double(h));  // as Bullet has moved them
     solveNewcomers(*world, double(h));
-    FastBodies fast(*world, m_impl->obstacles, all, m_impl->solved, double(h));
     moveShells(*world, double(h));
     fast.holdBack();
     m_impl->solved.clear();
