@@ -1,0 +1,191 @@
+// Contact of shells with bodies: what holds of weight, momentum and geometry.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "support/BulletScene.h"
+
+namespace jacket::bullet::testing {
+namespace {
+
+using jacket::testing::contactImpulse;
+using jacket::testing::Scene;
+
+constexpr double kStep = 1.0 / 60;
+
+/// A ball of 2 kg at rest in a sheet that is pinned at its border.
+TEST(Contact, ABallAtRestStaysWhereItIsAndWeighsWhatItWeighs) {
+    Scene scene;
+    auto& ball = scene.addSphere(0.25, 2.0, btVector3(0, btScalar(0.26), 0));
+    ball.setActivationState(DISABLE_DEACTIVATION);
+    ShellMaterial cloth = trampolineCloth();
+    cloth.massDamping = 5.0;
+    auto& sheet = scene.shells->add(squareSheet(2, 12), cloth, {.sleeping = false});
+    pinBorder(sheet);
+    scene.run(10.0, kStep);
+    const Vec3 start = toVec3(ball.getWorldTransform().getOrigin());
+    const double weight = 2.0 * 9.81;
+    const int steps = 300;
+    double sum = 0.0, worst = 0.0;
+    for (int i = 0; i < steps; ++i) {
+        scene.step(kStep);
+        const double force = contactImpulse(sheet, ball).y() / kStep;
+        sum += force;
+        worst = std::max(worst, std::abs(force - weight));
+    }
+    RecordProperty("mean_force_error", std::to_string(sum / steps / weight - 1));
+    RecordProperty("worst_force_error", std::to_string(worst / weight));
+    EXPECT_LT((toVec3(ball.getWorldTransform().getOrigin()) - start).norm(), 1e-3);
+    EXPECT_NEAR(sum / steps, weight, 1e-4 * weight);
+    EXPECT_LT(worst, 5e-3 * weight);
+}
+
+/// Bodies smaller than a triangle, or with corners that are, on a sheet of coarse cells.
+class SmallBody : public ::testing::TestWithParam<std::tuple<const char*, double>> {};
+
+std::unique_ptr<btCollisionShape> smallShape(const std::string& name) {
+    if (name == "ball") return std::make_unique<btSphereShape>(btScalar(0.04));
+    if (name == "rod") return std::make_unique<btCapsuleShapeX>(btScalar(0.02), btScalar(0.5));
+    if (name == "cone") return std::make_unique<btConeShape>(btScalar(0.1), btScalar(0.2));
+    return std::make_unique<btBoxShape>(btVector3(btScalar(0.1), btScalar(0.1), btScalar(0.1)));
+}
+
+TEST_P(SmallBody, IsCaughtAndBorneByASheetOfCoarseCells) {
+    const auto [name, mass] = GetParam();
+    Scene scene;
+    ShellMaterial cloth = trampolineCloth();
+    cloth.massDamping = 5.0;
+    auto& sheet = scene.shells->add(squareSheet(2, 10), cloth);  // edges of 0.2 m
+    pinBorder(sheet);
+    auto& body = scene.addBody(smallShape(name), mass, btVector3(btScalar(0.031), btScalar(0.3), btScalar(0.017)));
+    body.setDamping(btScalar(0.2), btScalar(0.8));
+    const bool onPoint = std::string(name) == "cone" || std::string(name) == "box";
+    btTransform pose = body.getWorldTransform();
+    pose.setRotation(
+        btQuaternion(btVector3(1, btScalar(0.3), btScalar(0.2)).normalized(), btScalar(onPoint ? 2.5 : 0)));
+    body.setWorldTransform(pose);
+    body.setInterpolationWorldTransform(pose);
+    scene.run(3.0, kStep);
+    double force = 0.0;
+    for (int i = 0; i < 30; ++i) {
+        scene.step(kStep);
+        force += contactImpulse(sheet, body).y() / (30 * kStep);
+    }
+    RecordProperty("force_over_weight", std::to_string(force / (mass * 9.81)));
+    const double lowest = sheet.shell().positions().row(1).minCoeff();
+    EXPECT_GT(double(body.getWorldTransform().getOrigin().y()), lowest - 0.02);
+    EXPECT_NEAR(force, mass * 9.81, 0.05 * mass * 9.81);
+}
+INSTANTIATE_TEST_SUITE_P(Shapes, SmallBody,
+                         ::testing::Combine(::testing::Values("ball", "rod", "cone", "box"),
+                                            ::testing::Values(0.02, 1.0)));
+
+TEST(Contact, TwoShellsGiveABodyWhatTheirContactsAndLedgersSay) {
+    Scene scene(0.0);
+    auto& ball = scene.addSphere(0.2, 0.7, btVector3(btScalar(0.05), btScalar(0.3), 0));
+    ball.setLinearVelocity(btVector3(btScalar(0.3), -2, 0));
+    TriangleMesh low = squareSheet(1.5, 10), high = low;
+    high.positions.row(1).array() += 0.01;
+    auto& first = scene.shells->add(high, trampolineCloth());
+    auto& second = scene.shells->add(low, trampolineCloth());
+    const Vec3 start = 0.7 * toVec3(ball.getLinearVelocity());
+    bool both = false;
+    for (int i = 0; i < 40; ++i) {
+        const Vec3 before = 0.7 * toVec3(ball.getLinearVelocity());
+        scene.step(kStep);
+        const Vec3 change = 0.7 * toVec3(ball.getLinearVelocity()) - before;
+        const Vec3 given = contactImpulse(first, ball) + contactImpulse(second, ball);
+        ASSERT_LT((change - given).norm(), bulletTolerance(1e-9, 1e-6)) << "step " << i;
+        both = both || (!first.contacts().empty() && !second.contacts().empty());
+    }
+    EXPECT_TRUE(both);
+    const Vec3 gain = 0.7 * toVec3(ball.getLinearVelocity()) - start;
+    EXPECT_GT(gain.norm(), 0.1);
+    EXPECT_LT((first.ledger().exchanged + second.ledger().exchanged - gain).norm(), bulletTolerance(1e-9, 1e-5));
+}
+
+TEST(Contact, TwoBodiesOnOneVertexAreBothBorne) {
+    Scene scene;
+    ShellMaterial cloth = trampolineCloth();
+    cloth.massDamping = 5.0;
+    auto& sheet = scene.shells->add(squareSheet(1, 4), cloth);
+    pinBorder(sheet);
+    std::vector<btRigidBody*> balls;
+    for (const double x : {-0.101, 0.101})
+        balls.push_back(&scene.addSphere(0.1, 0.3, btVector3(btScalar(x), btScalar(0.11), 0)));
+    for (btRigidBody* ball : balls) ball->setLinearFactor(btVector3(0, 1, 0));
+    scene.run(3.0, kStep);
+    for (const btRigidBody* ball : balls) {
+        EXPECT_NEAR(contactImpulse(sheet, *ball).y() / kStep, 0.3 * 9.81, 0.05 * 0.3 * 9.81);
+        EXPECT_NEAR(balls[0]->getWorldTransform().getOrigin().y(), ball->getWorldTransform().getOrigin().y(), 2e-3);
+    }
+}
+
+TEST(Contact, NamesObjectTriangleAndPlace) {
+    Scene scene;
+    auto& floor = scene.addFloor();
+    TriangleMesh mesh = squareSheet(0.5, 5);
+    mesh.positions.row(1).array() += 2e-4;
+    auto& sheet = scene.shells->add(mesh, trampolineCloth());
+    scene.run(0.2, kStep);
+    ASSERT_EQ(static_cast<int>(sheet.contacts().size()), sheet.vertexCount());
+    const Points& x = sheet.shell().positions();
+    for (const BodyContact& contact : sheet.contacts()) {
+        EXPECT_EQ(contact.object, &floor);
+        ASSERT_GE(contact.triangle, 0);
+        const auto corners = sheet.triangles().col(contact.triangle);
+        Vec3 place = Vec3::Zero();
+        for (int a = 0; a < 3; ++a) place += contact.barycentric[a] * x.col(corners[a]);
+        EXPECT_LT((place - x.col(contact.contact.vertices[0])).norm(), 1e-12);
+        EXPECT_NEAR(contact.contact.point.y(), 0.0, bulletTolerance(1e-9, 1e-6));
+    }
+}
+
+/// Moves a kinematic ball, by hand or by a motion state.
+class KinematicBall : public ::testing::TestWithParam<bool> {
+  protected:
+    KinematicBall() : ball(scene.addSphere(0.2, 0, btVector3(0, btScalar(-0.3), 0))) {
+        ball.setCollisionFlags(ball.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+        ball.setActivationState(DISABLE_DEACTIVATION);
+        if (GetParam()) ball.setMotionState(&motion);
+    }
+    void moveTo(double height) {
+        btTransform pose = btTransform::getIdentity();
+        pose.setOrigin(btVector3(0, btScalar(height), 0));
+        if (GetParam())
+            motion.setWorldTransform(pose);
+        else
+            ball.setWorldTransform(pose);
+    }
+    btDefaultMotionState motion{btTransform(btQuaternion::getIdentity(), btVector3(0, btScalar(-0.3), 0))};
+    Scene<> scene{0.0};
+    btRigidBody& ball;
+};
+
+TEST_P(KinematicBall, PushesASheetAlong) {
+    auto& sheet = scene.shells->add(squareSheet(1, 10), trampolineCloth());
+    for (int i = 1; i <= 60; ++i) {
+        moveTo(-0.3 + i * kStep);
+        scene.step(kStep);
+        ASSERT_LT(penetration(sheet, ball), 2e-2) << "step " << i;
+    }
+    EXPECT_GT(sheet.shell().positions().row(1).mean(), 0.3);
+    EXPECT_NEAR(double(sheet.linearMomentum().y()), 0.3, 0.1);  // 0.3 kg at the ball's 1 m/s
+}
+
+TEST_P(KinematicBall, ThrowsNothingWhenItIsTeleported) {
+    auto& sheet = scene.shells->add(squareSheet(1, 10), trampolineCloth());
+    scene.run(0.1, kStep);
+    moveTo(10.0);  // through the sheet
+    scene.run(0.2, kStep);
+    EXPECT_LT(sheet.shell().velocities().norm(), 1e-9);
+}
+INSTANTIATE_TEST_SUITE_P(MotionState, KinematicBall, ::testing::Bool());
+
+}  // namespace
+}  // namespace jacket::bullet::testing
