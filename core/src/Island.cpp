@@ -15,6 +15,7 @@ namespace jacket {
 namespace {
 
 constexpr double kEnergyGain = 0.02;     ///< of a step that is linearised again: see energyGain
+constexpr double kMostOvertaking = 3.0;  ///< of a shell that is pushed: its speed over the pushing body's
 constexpr double kMostEnergyGain = 1.0;  ///< of a step that is accepted as it is
 
 /// From a body's centre of mass to where the shell touches it, at the start of the step.
@@ -228,8 +229,8 @@ void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& 
     constexpr int kMostHalvings = 40;
     report.limited = true;
     const Points rigid = rigidMotion(input, v);
-    const bool isHeld = std::any_of(input.shells.begin(), input.shells.end(),
-                                    [](const Shell* shell) { return shell->pinCount() > 0; });
+    const bool isHeld =
+        std::any_of(input.shells.begin(), input.shells.end(), [](const Shell* shell) { return shell->pinCount() > 0; });
     for (int halving = 0; halving < kMostHalvings && energyGain(input) > kEnergyGain; ++halving) {
         blend(input, rigid);
         if (isHeld) impulseShare *= 0.5;  // its pins take the momentum; a light body would keep the shell's old speed
@@ -250,6 +251,7 @@ void IslandSolver::Impl::blend(const IslandInput& input, const Points& other) {
         for (int i = 0; i < input.shells[k]->vertexCount(); ++i)
             if (!input.shells[k]->isPinned(i))
                 v.col(offsets[k] + i) = 0.5 * (v.col(offsets[k] + i) + other.col(offsets[k] + i));
+    y *= 0.5;  // positions are mended another time
 }
 
 /// The rigid motion of each shell with the momentum of these velocities; none of shells that are held.
@@ -284,7 +286,7 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> IslandSolver::Impl::endTwists() const {
 /// that they start with, or that gravity gives what starts from rest.
 double IslandSolver::Impl::energyGain(const IslandInput& input) const {
     if (input.wind) return 0.0;  // what wind and pressure give is not known
-    double atStart = 0.0, gain = 0.0;
+    double atStart = 0.0, gain = 0.0, kineticAtEnd = 0.0, mass = 0.0;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         const int n = shell.vertexCount();
@@ -296,6 +298,8 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
             const double kinetic = 0.5 * shell.masses()[i] * before.col(i).squaredNorm();
             const Vec3 load = shell.masses()[i] * input.gravity + shell.forces().col(i);
             atStart += kinetic + 0.5 * shell.masses()[i] * (stepOf[k] * input.gravity).squaredNorm();
+            mass += shell.masses()[i];
+            kineticAtEnd += 0.5 * shell.masses()[i] * part.col(i).squaredNorm();
             gain += 0.5 * shell.masses()[i] * part.col(i).squaredNorm() - kinetic - stepOf[k] * load.dot(mean);
         }
         const double elastic = shell.elasticEnergy(shell.positions());
@@ -311,11 +315,20 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
         atStart += kinetic;
         gain += 0.5 * twists.col(b).dot(momentum.col(b)) - kinetic;
     }
-    for (const auto& held : system.constraints())  // work of pins and bodies that are moved
-        if (held.body < 0) gain -= std::max(0.0, -unfiltered.col(held.vertex).dot(held.carried));
-    for (const auto& row : system.rows())
-        if (row.body < 0) gain -= std::max(0.0, system.rowImpulse(row, v, u.w).dot(row.carried));
-    return gain / std::max(atStart, 1e-300);
+    double fastest2 = 0.0;
+    for (const auto& held : system.constraints()) {  // work of pins and bodies that are moved
+        if (held.body >= 0) continue;
+        gain -= std::max(0.0, -unfiltered.col(held.vertex).dot(held.carried));
+        fastest2 = std::max(fastest2, held.carried.squaredNorm());
+    }
+    for (const auto& row : system.rows()) {
+        if (row.body >= 0) continue;
+        gain -= std::max(0.0, system.rowImpulse(row, v, u.w).dot(row.carried));
+        fastest2 = std::max(fastest2, row.carried.squaredNorm());
+    }
+    // Jammed between walls the work is any number; but what they push cannot be much faster than they are.
+    const double most = std::max(atStart + 0.5 * kMostOvertaking * kMostOvertaking * mass * fastest2, 1e-300);
+    return std::max(gain / std::max(atStart, 1e-300), kineticAtEnd / most - 1.0);
 }
 
 void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {

@@ -10,52 +10,44 @@
 namespace jacket::bullet {
 namespace {
 
-constexpr int kDeepestPile = 8;  // bodies below the one that bears the load
+/// Impulse that a manifold gave the body.
+Vec3 impulseOn(const btCollisionObject& body, const btPersistentManifold& manifold) {
+    const double sign = manifold.getBody0() == &body ? 1.0 : -1.0;
+    Vec3 sum = Vec3::Zero();
+    for (int k = 0; k < manifold.getNumContacts(); ++k) {
+        const btManifoldPoint& point = manifold.getContactPoint(k);
+        sum += sign * double(point.m_appliedImpulse) * fromBullet(point.m_normalWorldOnB);
+    }
+    return sum;
+}
 
-/// A manifold of a body, and the impulse that it gave the body.
-struct Support {
-    btPersistentManifold* manifold;
-    const btCollisionObject* other;
-    Vec3 impulse;
-};
-
-std::vector<Support> supportsOf(btDispatcher& dispatcher, const btCollisionObject& body) {
-    std::vector<Support> supports;
+/// Manifolds with what does not move: only that bears all of a load. Another body gives way.
+std::vector<btPersistentManifold*> groundsOf(btDispatcher& dispatcher, const btCollisionObject& body) {
+    std::vector<btPersistentManifold*> grounds;
     for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
         btPersistentManifold* manifold = dispatcher.getManifoldByIndexInternal(m);
         const bool first = manifold->getBody0() == &body;
         if (!first && manifold->getBody1() != &body) continue;
-        Support support{manifold, first ? manifold->getBody1() : manifold->getBody0(), Vec3::Zero()};
-        if (!body.hasContactResponse() || !support.other->hasContactResponse()) continue;
-        for (int k = 0; k < manifold->getNumContacts(); ++k) {
-            const btManifoldPoint& point = manifold->getContactPoint(k);
-            support.impulse +=
-                (first ? 1.0 : -1.0) * double(point.m_appliedImpulse) * fromBullet(point.m_normalWorldOnB);
-        }
-        supports.push_back(support);
+        const btCollisionObject& other = *(first ? manifold->getBody1() : manifold->getBody0());
+        if (other.isStaticOrKinematicObject() && other.hasContactResponse() && body.hasContactResponse())
+            grounds.push_back(manifold);
     }
-    return supports;
-}
-
-void foretell(btDispatcher& dispatcher, const btCollisionObject& body, const Vec3& change, int depth) {
-    const std::vector<Support> supports = supportsOf(dispatcher, body);
-    Vec3 total = Vec3::Zero();
-    for (const Support& support : supports) total += support.impulse;
-    if (!(total.squaredNorm() > 0.0)) return;
-    // What supports it bears the change along its own direction, every point by its share.
-    const double factor = std::max(0.0, 1.0 - change.dot(total) / total.squaredNorm());
-    for (const Support& support : supports) {
-        for (int k = 0; k < support.manifold->getNumContacts(); ++k)
-            support.manifold->getContactPoint(k).m_appliedImpulse *= btScalar(factor);
-        if (depth < kDeepestPile && !support.other->isStaticOrKinematicObject() && support.impulse.dot(total) > 0.0)
-            foretell(dispatcher, *support.other, (1.0 - factor) * support.impulse, depth + 1);
-    }
+    return grounds;
 }
 
 }  // namespace
 
 void foretellLoad(btDispatcher& dispatcher, const btCollisionObject& body, const Vec3& change) {
-    if (!change.isZero(0.0)) foretell(dispatcher, body, change, 0);
+    if (change.isZero(0.0)) return;
+    const std::vector<btPersistentManifold*> grounds = groundsOf(dispatcher, body);
+    Vec3 total = Vec3::Zero();
+    for (const btPersistentManifold* manifold : grounds) total += impulseOn(body, *manifold);
+    if (!(total.squaredNorm() > 0.0)) return;
+    // The ground bears the change along its own direction, every point by its share.
+    const double factor = std::max(0.0, 1.0 - change.dot(total) / total.squaredNorm());
+    for (btPersistentManifold* manifold : grounds)
+        for (int k = 0; k < manifold->getNumContacts(); ++k)
+            manifold->getContactPoint(k).m_appliedImpulse *= btScalar(factor);
 }
 
 }  // namespace jacket::bullet

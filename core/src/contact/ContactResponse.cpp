@@ -18,6 +18,7 @@ constexpr double kPull = 1e-3;            // of the largest impulse: a contact t
 constexpr int kFrictionRounds = 4;        // then the lagged friction of the last round stands
 constexpr int kMostFlips = 3;             // a contact that sticks and slides by turns more often is damped instead
 constexpr double kMostFriction = 1.2;     // of what Coulomb allows: more is solved again
+constexpr double kHelps = 0.9;            // of what a row lacked: a multiplier that leaves more of it does not help
 constexpr double kNearEdge = 0.1;         // weight of a triangle's corner below which its contact is an edge's
 constexpr double kSamePoint = 0.15;       // of an edge: how far it may move in a round
 constexpr double kSameContact = 0.3;      // of an edge: how far the point of a face's contact may move in a step
@@ -341,15 +342,38 @@ bool ContactResponse::joinFilter(int index, std::vector<VertexConstraint>& const
     VertexFilter& filter = m_filters[m_filterOf[vertex]];
     const bool bothPrescribed = touch.dynamicBody < 0 && m_touches[filter.touches[0]].dynamicBody < 0;
     if (!bothPrescribed || filter.count == 3) return false;
-    for (int k = 0; k < filter.count; ++k)  // pinched: opposite walls cannot both be met exactly, a soft row gives way
-        if (touch.contact.normal.dot(m_touches[filter.touches[k]].contact.normal) < -0.9) return false;
+    for (int k = 0; k < filter.count; ++k) {  // opposite walls cannot both be met exactly
+        if (touch.contact.normal.dot(m_touches[filter.touches[k]].contact.normal) > -0.9) continue;
+        if (k > 0 || filter.opposite >= 0) return false;
+        filter.opposite = index;
+        return true;
+    }
     filter.touches[filter.count++] = index;
     return true;
 }
 
+/// Whether the walls on both sides of a vertex leave it no room; `target`: half way between what they want then.
+bool ContactResponse::isPinched(const VertexFilter& filter, double& target) const {
+    if (filter.opposite < 0) return false;
+    const Touch &first = m_touches[filter.touches[0]], &other = m_touches[filter.opposite];
+    const Vec3& n = first.contact.normal;
+    const double most = -other.target + n.dot(other.carried - first.carried);
+    if (first.target <= most) return false;
+    target = 0.5 * (first.target + most);
+    return true;
+}
+
 void ContactResponse::finishFilter(VertexFilter& filter, VertexConstraint& constraint,
-                                   std::vector<SoftRow>& rows) const {
-    const Touch& first = m_touches[filter.touches[0]];
+                                   std::vector<SoftRow>& rows) {
+    Touch& first = m_touches[filter.touches[0]];
+    double between = 0.0;
+    first.jammed = isPinched(filter, between);
+    if (filter.opposite >= 0) m_touches[filter.opposite].jammed = first.jammed;
+    if (first.jammed) {  // held fast, with whatever force that takes
+        constraint.free.setZero();
+        constraint.z = between * first.contact.normal;
+        return;
+    }
     Mat3 held = Mat3::Zero();
     for (int k = 0; k < filter.count; ++k) {
         const Touch& touch = m_touches[filter.touches[k]];
@@ -447,7 +471,10 @@ void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelo
         if (!touch.isRow) continue;
         const Vec3 u = relativeVelocity(touch, solved);
         const Vec3& n = touch.contact.normal;
-        touch.normalImpulse = touch.lambda + touch.kappa * (touch.target - u.dot(n));
+        const double missing = touch.target - u.dot(n);
+        touch.jammed = touch.jammed || (touch.missing > 0.0 && missing > kHelps * touch.missing);
+        touch.missing = missing;
+        touch.normalImpulse = touch.lambda + touch.kappa * missing;
         Mat3 damping = Mat3::Zero();
         touch.impulse = touch.normalImpulse * n;
         addFriction(touch, damping, touch.impulse);
@@ -476,12 +503,12 @@ bool ContactResponse::releasePulling(int round) {
     for (const Touch& touch : m_touches) most = std::max(most, touch.normalImpulse);
     for (Touch& touch : m_touches) {
         if (!touch.active) continue;
-        if (touch.normalImpulse < -kPull * most && touch.changes < kMostChanges) {
+        if (touch.normalImpulse < -kPull * most && !touch.jammed && touch.changes < kMostChanges) {
             touch.active = false;
             touch.lambda = 0.0;
             ++touch.changes;
             changed = true;
-        } else if (touch.isRow) {
+        } else if (touch.isRow && !touch.jammed) {
             touch.lambda = std::max(touch.normalImpulse, 0.0);
         }
     }
@@ -680,8 +707,12 @@ void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
         if (touch.impulse.isZero(0.0)) continue;  // took no part in the last solve
         impulses.push_back({touch.contact, touch.impulse, touch.sticks, touch.slide});
         if (touch.active && touch.normalImpulse > 0.0)
-            m_memory[keyOf(touch.contact)] = {touch.normalImpulse, touch.offset,        touch.sticks,
-                                              touch.slip,          touch.contact.point, touch.contact.isVertex()};
+            m_memory[keyOf(touch.contact)] = {touch.jammed ? touch.lambda : touch.normalImpulse,
+                                              touch.offset,
+                                              touch.sticks,
+                                              touch.slip,
+                                              touch.contact.point,
+                                              touch.contact.isVertex()};
     }
 }
 

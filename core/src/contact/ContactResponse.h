@@ -66,6 +66,8 @@ class ContactResponse {
         double allowedGap = 0.0;  ///< <= 0: what it stood inside at the start and need not leave at once [m]
         bool active = false, sticks = false, isRow = false;
         double lambda = 0.0, kappa = 0.0;  ///< soft rows: multiplier [N s] and penalty [kg]
+        double missing = 0.0;              ///< soft rows: normal velocity short of the target in the last solve [m/s]
+        bool jammed = false;               ///< something else holds the shell there: its multiplier no longer helps
         Slip slip;
         int flips = 0;        ///< between sticking and sliding, in this step
         double offset = 0.0;  ///< how far it is kept off the surface for its chords' sake [m]
@@ -90,6 +92,7 @@ class ContactResponse {
         int count = 0;
         std::array<int, 3> touches{};
         int friction = -1;  ///< its soft row in the system, where it slides
+        int opposite = -1;  ///< a touch from the other side, by a body of prescribed motion too
     };
 
     Key keyOf(const Contact& c) const;
@@ -109,7 +112,8 @@ class ContactResponse {
     void alter(Touch& touch, Points& y) const;
     std::vector<VertexConstraint> holdConstraints() const;
     bool joinFilter(int touch, std::vector<VertexConstraint>& constraints);
-    void finishFilter(VertexFilter& filter, VertexConstraint& constraint, std::vector<SoftRow>& rows) const;
+    bool isPinched(const VertexFilter& filter, double& target) const;
+    void finishFilter(VertexFilter& filter, VertexConstraint& constraint, std::vector<SoftRow>& rows);
     SoftRow makeRow(Touch& touch, const CoupledSystem& system) const;
     double vertexStiffness(const CoupledSystem& system, const Touch& touch) const;
     void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);
