@@ -15,6 +15,7 @@ namespace jacket {
 namespace {
 
 constexpr double kEnergyGain = 0.02;     ///< of a step that is linearised again: see energyGain
+constexpr double kMostGainOfFast = 0.1;  ///< the same where a body goes farther than it is thick
 constexpr double kMostOvertaking = 3.0;  ///< of a shell that is pushed: its speed over the pushing body's
 constexpr double kMostEnergyGain = 1.0;  ///< of a step that is accepted as it is
 
@@ -50,6 +51,7 @@ struct IslandSolver::Impl {
     void assemble(const IslandInput& input, bool atEnd);
     bool overstretches(const IslandInput& input) const;
     double energyGain(const IslandInput& input) const;
+    bool bodiesLead(const IslandInput& input) const;
     void limitDeformation(const IslandInput& input, StepReport& report);
     void blend(const IslandInput& input, const Points& other);
     Points rigidMotion(const IslandInput& input, const Points& velocities) const;
@@ -159,7 +161,8 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
         assemble(input, calmest.cols() > 0);  // back to what threw the shell about least
         solveRounds(input, report);
     }
-    if (unfiltered.allFinite() && energyGain(input) > kMostEnergyGain) limitDeformation(input, report);
+    const double mostGain = response.hasFastBody() && bodiesLead(input) ? kMostGainOfFast : kMostEnergyGain;
+    if (unfiltered.allFinite() && energyGain(input) > mostGain) limitDeformation(input, report);
 }
 
 /// After one more Newton step from velocities `before`: goes back along it until the incremental potential is not above
@@ -251,7 +254,6 @@ void IslandSolver::Impl::blend(const IslandInput& input, const Points& other) {
         for (int i = 0; i < input.shells[k]->vertexCount(); ++i)
             if (!input.shells[k]->isPinned(i))
                 v.col(offsets[k] + i) = 0.5 * (v.col(offsets[k] + i) + other.col(offsets[k] + i));
-    y *= 0.5;  // positions are mended another time
 }
 
 /// The rigid motion of each shell with the momentum of these velocities; none of shells that are held.
@@ -282,11 +284,23 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> IslandSolver::Impl::endTwists() const {
     return freeTwist + impulseShare * (u.w - freeTwist);
 }
 
+/// Whether most of the energy comes with the bodies.
+bool IslandSolver::Impl::bodiesLead(const IslandInput& input) const {
+    double inShells = 0.0, inBodies = 0.0;
+    for (const Shell* shell : input.shells) {
+        const ShellEnergy energy = shell->energy();
+        inShells += energy.kinetic + energy.membrane + energy.bending;
+    }
+    for (const int b : dynamicBodies)
+        inBodies += 0.5 * input.bodies[b].freeTwist.dot(input.bodies[b].mass * input.bodies[b].freeTwist);
+    return inBodies > inShells;
+}
+
 /// What shells and bodies gain in the solved step besides what gravity, forces and moved supports do, over the energy
 /// that they start with, or that gravity gives what starts from rest.
 double IslandSolver::Impl::energyGain(const IslandInput& input) const {
     if (input.wind) return 0.0;  // what wind and pressure give is not known
-    double atStart = 0.0, gain = 0.0, kineticAtEnd = 0.0, mass = 0.0;
+    double atStart = 0.0, gain = 0.0, pushed = 0.0, mass = 0.0;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         const int n = shell.vertexCount();
@@ -299,7 +313,7 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
             const Vec3 load = shell.masses()[i] * input.gravity + shell.forces().col(i);
             atStart += kinetic + 0.5 * shell.masses()[i] * (stepOf[k] * input.gravity).squaredNorm();
             mass += shell.masses()[i];
-            kineticAtEnd += 0.5 * shell.masses()[i] * part.col(i).squaredNorm();
+            pushed += 0.5 * shell.masses()[i] * part.col(i).squaredNorm() - stepOf[k] * load.dot(mean);
             gain += 0.5 * shell.masses()[i] * part.col(i).squaredNorm() - kinetic - stepOf[k] * load.dot(mean);
         }
         const double elastic = shell.elasticEnergy(shell.positions());
@@ -328,7 +342,7 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
     }
     // Jammed between walls the work is any number; but what they push cannot be much faster than they are.
     const double most = std::max(atStart + 0.5 * kMostOvertaking * kMostOvertaking * mass * fastest2, 1e-300);
-    return std::max(gain / std::max(atStart, 1e-300), kineticAtEnd / most - 1.0);
+    return std::max(gain / std::max(atStart, 1e-300), pushed / most - 1.0);
 }
 
 void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {

@@ -18,7 +18,6 @@ constexpr double kPull = 1e-3;            // of the largest impulse: a contact t
 constexpr int kFrictionRounds = 4;        // then the lagged friction of the last round stands
 constexpr int kMostFlips = 3;             // a contact that sticks and slides by turns more often is damped instead
 constexpr double kMostFriction = 1.2;     // of what Coulomb allows: more is solved again
-constexpr double kHelps = 0.9;            // of what a row lacked: a multiplier that leaves more of it does not help
 constexpr double kNearEdge = 0.1;         // weight of a triangle's corner below which its contact is an edge's
 constexpr double kSamePoint = 0.15;       // of an edge: how far it may move in a round
 constexpr double kSameContact = 0.3;      // of an edge: how far the point of a face's contact may move in a step
@@ -97,6 +96,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     m_index.clear();
     m_deepestGap = 0.0;
     m_frictionRounds = 0;
+    m_anyFast = false;
     m_held.assign(y.cols(), 0);
     m_filterOf.assign(y.cols(), -1);
     m_edge.clear();
@@ -363,8 +363,7 @@ bool ContactResponse::isPinched(const VertexFilter& filter, double& target) cons
     return true;
 }
 
-void ContactResponse::finishFilter(VertexFilter& filter, VertexConstraint& constraint,
-                                   std::vector<SoftRow>& rows) {
+void ContactResponse::finishFilter(VertexFilter& filter, VertexConstraint& constraint, std::vector<SoftRow>& rows) {
     Touch& first = m_touches[filter.touches[0]];
     double between = 0.0;
     first.jammed = isPinched(filter, between);
@@ -471,10 +470,7 @@ void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelo
         if (!touch.isRow) continue;
         const Vec3 u = relativeVelocity(touch, solved);
         const Vec3& n = touch.contact.normal;
-        const double missing = touch.target - u.dot(n);
-        touch.jammed = touch.jammed || (touch.missing > 0.0 && missing > kHelps * touch.missing);
-        touch.missing = missing;
-        touch.normalImpulse = touch.lambda + touch.kappa * missing;
+        touch.normalImpulse = touch.lambda + touch.kappa * (touch.target - u.dot(n));
         Mat3 damping = Mat3::Zero();
         touch.impulse = touch.normalImpulse * n;
         addFriction(touch, damping, touch.impulse);
@@ -508,7 +504,7 @@ bool ContactResponse::releasePulling(int round) {
             touch.lambda = 0.0;
             ++touch.changes;
             changed = true;
-        } else if (touch.isRow && !touch.jammed) {
+        } else if (touch.isRow) {
             touch.lambda = std::max(touch.normalImpulse, 0.0);
         }
     }
@@ -707,12 +703,8 @@ void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
         if (touch.impulse.isZero(0.0)) continue;  // took no part in the last solve
         impulses.push_back({touch.contact, touch.impulse, touch.sticks, touch.slide});
         if (touch.active && touch.normalImpulse > 0.0)
-            m_memory[keyOf(touch.contact)] = {touch.jammed ? touch.lambda : touch.normalImpulse,
-                                              touch.offset,
-                                              touch.sticks,
-                                              touch.slip,
-                                              touch.contact.point,
-                                              touch.contact.isVertex()};
+            m_memory[keyOf(touch.contact)] = {touch.normalImpulse, touch.offset,        touch.sticks,
+                                              touch.slip,          touch.contact.point, touch.contact.isVertex()};
     }
 }
 

@@ -45,6 +45,7 @@ class ContactResponse {
     /// Contacts that carried an impulse; remembers them for the next step.
     void finish(std::vector<ContactImpulse>& impulses);
     double slop() const { return m_vertexSlop; }
+    bool hasFastBody() const { return m_anyFast; }
     /// Whether a fast body goes through a shell with these velocities.
     bool passes(const IslandVelocities& solved, const Points& y);
 
@@ -66,8 +67,7 @@ class ContactResponse {
         double allowedGap = 0.0;  ///< <= 0: what it stood inside at the start and need not leave at once [m]
         bool active = false, sticks = false, isRow = false;
         double lambda = 0.0, kappa = 0.0;  ///< soft rows: multiplier [N s] and penalty [kg]
-        double missing = 0.0;              ///< soft rows: normal velocity short of the target in the last solve [m/s]
-        bool jammed = false;               ///< something else holds the shell there: its multiplier no longer helps
+        bool jammed = false;               ///< walls on both sides leave the vertex no room
         Slip slip;
         int flips = 0;        ///< between sticking and sliding, in this step
         double offset = 0.0;  ///< how far it is kept off the surface for its chords' sake [m]
