@@ -222,7 +222,7 @@ TEST(Heightfield, AClothDrapesOverAHill) {
         scene.step(kStep);
         lowest = std::min(lowest, lowestClearance(sheet, surface));
     }
-    EXPECT_GT(lowest, -1e-4);
+    EXPECT_GT(lowest, -bulletTolerance(1e-4, 1e-3));
     EXPECT_LT(sheet.positions()[0].y(), 0.05);  // a corner has come down
     EXPECT_EQ(scene.shells->lastStep().rejectedSteps, 0);
 }
@@ -419,7 +419,7 @@ TEST(OtherConvexShapes, HangInASheetLikeABall) {
         pinBorder(sheet);
         scene.run(0.5, kStep);
         heights.push_back(double(ball.getWorldTransform().getOrigin().y()));
-        EXPECT_LT(penetration(sheet, toVec3(ball.getWorldTransform().getOrigin()), 0.2), 2e-3);
+        EXPECT_LT(penetration(sheet, toVec3(ball.getWorldTransform().getOrigin()), 0.2), bulletTolerance(2e-3, 8e-3));
     }
     EXPECT_NEAR(heights[1], heights[0], 2e-3);
     EXPECT_NEAR(heights[2], heights[0], 2e-3);
