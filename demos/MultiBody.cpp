@@ -8,16 +8,11 @@
 
 #include <algorithm>
 
+#include "Convert.h"
+
 namespace jacket::demo {
 
 namespace {
-
-btVector3 toBullet(const Vec3& v) {
-    return {btScalar(v.x()), btScalar(v.y()), btScalar(v.z())};
-}
-Vec3 fromBullet(const btVector3& v) {
-    return {v.x(), v.y(), v.z()};
-}
 
 Vec3 startOf(const MultiBodyPart& part) {
     return part.description->transform.position + part.centre;

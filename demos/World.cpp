@@ -10,6 +10,7 @@
 #include <numbers>
 #include <type_traits>
 
+#include "Convert.h"
 #include "Loads.h"
 #include "Meshes.h"
 #include "MultiBody.h"
@@ -19,31 +20,9 @@ namespace jacket::demo {
 
 namespace {
 
-btVector3 toBullet(const Vec3& v) {
-    return {btScalar(v.x()), btScalar(v.y()), btScalar(v.z())};
-}
-Vec3 fromBullet(const btVector3& v) {
-    return {v.x(), v.y(), v.z()};
-}
-
-btMatrix3x3 toBullet(const Mat3& m) {
-    return {btScalar(m(0, 0)), btScalar(m(0, 1)), btScalar(m(0, 2)), btScalar(m(1, 0)), btScalar(m(1, 1)),
-            btScalar(m(1, 2)), btScalar(m(2, 0)), btScalar(m(2, 1)), btScalar(m(2, 2))};
-}
-
-Mat3 fromBullet(const btMatrix3x3& m) {
-    Mat3 result;
-    for (int i = 0; i < 3; ++i) result.row(i) = fromBullet(m[i]).transpose();
-    return result;
-}
-
 /// Bullet's rounding of edges between bodies, kept small beside the shape: it would show as a gap.
 btScalar smallMargin(double size) {
     return btScalar(0.002 * size);
-}
-
-btTransform toBullet(const Transform& transform) {
-    return btTransform(toBullet(transform.rotation()), toBullet(transform.position));
 }
 
 /// What shapes are made of, which Bullet does not own.
