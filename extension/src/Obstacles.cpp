@@ -58,10 +58,23 @@ Vec6 freeTwistOf(const btRigidBody& body, double h) {
     return twist;
 }
 
+/// Velocity that a body's point will have after the coming step if nothing touches the body.
+Vec3 pointVelocity(const btRigidBody& body, const Vec3& at, double h) {
+    const Vec6 twist = body.isStaticOrKinematicObject() ? twistOf(body) : freeTwistOf(body, h);
+    return twist.head<3>() + twist.tail<3>().cross(at - fromBullet(body.getCenterOfMassPosition()));
+}
+
+int loadedPoints(const btPersistentManifold& manifold) {
+    int count = 0;
+    for (int k = 0; k < manifold.getNumContacts(); ++k)
+        count += manifold.getContactPoint(k).m_appliedImpulse > btScalar(0);
+    return count;
+}
+
 /// Rigid contacts that carried impulse in the last solve stay in this one as stiff rows, or a shell would press a
 /// supported box through the floor.
-void addSupports(btDispatcher& dispatcher, const btRigidBody& body, CoupledBody& coupled) {
-    Mat6 support = Mat6::Zero();
+void addSupports(btDispatcher& dispatcher, const btRigidBody& body, double h, CoupledBody& coupled) {
+    const double mass = coupled.mass.diagonal().head<3>().minCoeff();
     for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
         const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(m);
         const bool first = manifold.getBody0() == &body;
@@ -69,21 +82,25 @@ void addSupports(btDispatcher& dispatcher, const btRigidBody& body, CoupledBody&
         const btCollisionObject* otherObject = first ? manifold.getBody1() : manifold.getBody0();
         if (!otherObject->hasContactResponse()) continue;  // a shell, shown to the user: see ContactManifolds
         const auto* other = btRigidBody::upcast(otherObject);
-        const double mass = coupled.mass.diagonal().head<3>().minCoeff();
-        const double weight =
-            other && other->getInvMass() > 0 && other->isActive() ? 1.0 / double(other->getInvMass()) : kSupport * mass;
+        const bool isFree = other && other->getInvMass() > 0 && other->isActive();
+        const int points = loadedPoints(manifold);  // a free body is as heavy as it is, over all of them
+        const double weight = isFree ? 1.0 / (double(other->getInvMass()) * std::max(points, 1)) : kSupport * mass;
         for (int k = 0; k < manifold.getNumContacts(); ++k) {
             const btManifoldPoint& point = manifold.getContactPoint(k);
             if (!(point.m_appliedImpulse > btScalar(0))) continue;
-            const Vec3 n = fromBullet(point.m_normalWorldOnB);
+            const Vec3 n = (first ? 1.0 : -1.0) * fromBullet(point.m_normalWorldOnB);
             const Vec3 at = fromBullet(first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
             const Vec6 row = (Vec6() << n, (at - coupled.position).cross(n)).finished();
-            support += weight * row * row.transpose();
+            const double velocity = other ? pointVelocity(*other, at, h).dot(n) : 0.0;
+            coupled.supports.push_back({row, velocity, weight});
         }
     }
-    if (support.isZero(0.0)) return;
-    const Vec6 momentum = coupled.mass * coupled.freeTwist;
-    coupled.mass += support;
+    if (coupled.supports.empty()) return;
+    Vec6 momentum = coupled.mass * coupled.freeTwist;
+    for (const auto& [row, velocity, weight] : coupled.supports) {
+        coupled.mass += weight * row * row.transpose();
+        momentum += weight * velocity * row;
+    }
     coupled.freeTwist = coupled.mass.ldlt().solve(momentum);
 }
 
@@ -126,7 +143,7 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, btDispatcher& disp
         if (moves && !hasMoved && m_gravityIsNoForce)
             coupled.freeTwist.head<3>() += h * fromBullet(rigid->getGravity());
         if (moves) coupled.mass = massOf(*rigid);
-        if (moves && !hasMoved) addSupports(dispatcher, *rigid, coupled);
+        if (moves && !hasMoved) addSupports(dispatcher, *rigid, h, coupled);
     }
     coupled.position = obstacle.start.translation();
     return obstacle;

@@ -8,14 +8,23 @@
 /// Everything that the solver and the collision code say to each other.
 namespace jacket {
 
+/// A rigid contact of a body with something else, which bore load when the step began: it keeps row . twist from
+/// falling below `velocity`. Mass and free twist of its body are given as if it held either way, by a stiff term weight
+/// row row^T.
+struct BodySupport {
+    Vec6 row = Vec6::Zero();  ///< velocity along the contact's normal, towards the body, from the body's twist
+    double velocity = 0.0;    ///< of what is on the other side [m/s]
+    double weight = 0.0;      ///< how heavy that is [kg], > 0
+};
+
 /// A rigid body that takes part in the shells' solve. Twists are (velocity of the centre of mass, angular velocity).
 struct CoupledBody {
-    Vec3 position = Vec3::Zero();  ///< centre of mass at the start of the step [m]
-    Mat6 mass =
-        Mat6::Zero();  ///< blockdiag(m I, R I R^T); rigid contacts that hold the body may be added as stiff terms
+    Vec3 position = Vec3::Zero();   ///< centre of mass at the start of the step [m]
+    Mat6 mass = Mat6::Zero();       ///< blockdiag(m I, R I R^T), and the stiff terms of its supports
     Vec6 freeTwist = Vec6::Zero();  ///< w*: what it would do without the shells, the coming gravity included
     double radius = 0.0;            ///< of a ball around `position` that holds the body [m]
     double inner = 1e300;  ///< of a ball that fits into its thinnest piece: contacts of faster motion are swept [m]
+    std::vector<BodySupport> supports{};
     const void* key = nullptr;    ///< the same from step to step: whose contacts to remember
     bool prescribed = false;      ///< static, kinematic or sleeping: moves with freeTwist whatever the shells do
     Vec6 twist = Vec6::Zero();    ///< out: solved twist at the end of the step, to the solve's tolerance

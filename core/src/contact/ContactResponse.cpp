@@ -12,9 +12,10 @@ constexpr double kNone = -std::numeric_limits<double>::infinity();
 constexpr double kRowPenalty = 10.0;  // penalty of a soft row over the stiffness of its vertices: a round leaves < 1/10
 constexpr double kAlteration = 0.2;   // share of a penetration that a step takes back, and share of an edge at most
 constexpr double kMostOffset =
-    0.15;  // of an edge: how far vertices are lifted off a curved body for their chords' sake
+    0.15;                          // of an edge: how far vertices are lifted off a curved body for their chords' sake
+constexpr double kDeep = 0.1;      // of an edge: what is worth another solve where few are made
+constexpr double kMostPush = 0.2;  // of an edge: how far pushOut goes
 constexpr double kOffsetDecay = 0.998;    // a step: a lift that is no longer needed goes away
-constexpr double kPull = 1e-3;            // of the largest impulse: a contact that pulls less may stay for the step
 constexpr int kFrictionRounds = 4;        // then the lagged friction of the last round stands
 constexpr int kMostFlips = 3;             // a contact that sticks and slides by turns more often is damped instead
 constexpr double kMostFriction = 1.2;     // of what Coulomb allows: more is solved again
@@ -111,6 +112,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     for (const auto& anchor : input.anchors) m_held[m_offsets[anchor.shell] + anchor.vertex] = 1;
     if (!input.contacts) return;
 
+    m_care = isAmongWalls() ? kAmongWalls : kInFull;
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);
     m_faceSlop = std::min(2e-4, 1e-2 * shortest);
     for (const auto& body : input.bodies)
@@ -129,8 +131,16 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     keepEarliest();
 }
 
+/// Whether nothing rests on the contacts or is thrown by them, and nothing squeezes a shell.
+bool ContactResponse::isAmongWalls() const {
+    if (m_input.bodies.size() == 1) return m_input.bodies[0].prescribed;
+    return std::all_of(m_input.bodies.begin(), m_input.bodies.end(),
+                       [](const CoupledBody& b) { return b.prescribed && b.freeTwist.isZero(0.0); });
+}
+
 void ContactResponse::addAtStart(const Contact& contact, const std::map<int, double>& room, Points& y) {
     Touch touch = makeTouch(contact);
+    touch.startGap = contact.gap;
     const Memory* memory = remembered(contact);
     if (!contact.isVertex() && !memory) return;  // found at the end of the step if it matters
     if (memory && memory->offset > 0.0) {
@@ -149,7 +159,7 @@ void ContactResponse::addAtStart(const Contact& contact, const std::map<int, dou
         touch.slip = memory->slip;
         touch.slip.limit *= scale;
         touch.slip.held = tangential(touch.contact.normal) * touch.slip.held * scale;
-        touch.active = touch.active || touch.contact.gap < 10.0 * m_vertexSlop;
+        touch.active = touch.active || (memory->impulse > 0.0 && touch.contact.gap < 10.0 * m_vertexSlop);
     }
     const auto [known, fresh] = m_index.try_emplace(keyOf(contact), static_cast<int>(m_touches.size()));
     if (!fresh && m_touches[known->second].contact.gap <= touch.contact.gap) return;
@@ -426,9 +436,20 @@ double ContactResponse::vertexStiffness(const CoupledSystem& system, const Touch
     return sum;
 }
 
+/// Where something else holds all vertices of a contact, the body is what must give way: its mass counts, not theirs
+/// [kg].
+double ContactResponse::pinchedMass(const Touch& touch) const {
+    if (touch.dynamicBody < 0) return 0.0;
+    for (int a = 0; a < 3; ++a) {
+        const int vertex = globalVertex(touch.contact, a);
+        if (touch.contact.weights[a] > 0.0 && !m_held[vertex] && m_filterOf[vertex] < 0) return 0.0;
+    }
+    return m_input.bodies[touch.contact.body].mass.diagonal().head<3>().minCoeff();
+}
+
 SoftRow ContactResponse::makeRow(Touch& touch, const CoupledSystem& system) const {
     const Contact& c = touch.contact;
-    touch.kappa = kRowPenalty * vertexStiffness(system, touch);
+    touch.kappa = kRowPenalty * std::max(vertexStiffness(system, touch), pinchedMass(touch));
     SoftRow row;
     for (int a = 0; a < 3; ++a) row.vertices[a] = globalVertex(c, a);
     row.weights = c.weights;
@@ -448,18 +469,35 @@ Vec3 ContactResponse::relativeVelocity(const Touch& touch, const IslandVelocitie
     return u;
 }
 
-bool ContactResponse::update(const CoupledSystem& system, const IslandVelocities& solved, const Points& y, int round) {
+bool ContactResponse::update(const CoupledSystem& system, const IslandVelocities& solved, const Points& y, int round,
+                             bool rough) {
     if (!m_input.contacts) return false;
     for (Touch& touch : m_touches) touch.lifted = 0.0;
     readImpulses(system, solved);
+    if (isQuick()) return updateQuickly(system, solved, y, round, rough);
     const bool released = releasePulling(round);
     // Where everything ends is worth looking at only when no contact pulls: before, velocities can be anything.
     const bool entered = !released && checkEnd(solved, y, round);
     // Friction follows the normal impulses only when these have settled: lagged behind a passing one it runs away.
-    const bool slid = !released && !entered && updateFriction(system);
+    const bool slid = !released && !entered && updateFriction(system, false).share > 0.0;
     const bool changed = released || entered || slid;
     if (changed && round + 2 == kMaxRounds) dropExcessFriction();
     return changed && round + 1 < kMaxRounds;
+}
+
+/// All at once after the first solve; later only what ends deep inside a body, and friction while much of it is new.
+/// Else friction follows the last solve's impulses into the next step. A rough solve cannot tell sticking from sliding.
+bool ContactResponse::updateQuickly(const CoupledSystem& system, const IslandVelocities& solved, const Points& y,
+                                    int round, bool rough) {
+    constexpr double kMuch = 0.5, kMuchTooMuch = 0.15;  // of all friction
+    findAtEnd(solved, y);
+    const bool released = round == 0 && releasePulling(round);
+    const bool entered = (round == 0 || isAnyDeep()) && closeFound(solved, round);
+    const FrictionChange friction = updateFriction(system, rough);
+    const bool slid = friction.share > kMuch || friction.excess > kMuchTooMuch;
+    if (slid && m_frictionRounds == kFrictionRounds)  // at least none pushes by more than Coulomb's limit
+        for (Touch& touch : m_touches) touch.slip.speed = std::numeric_limits<double>::infinity();
+    return (released || entered || slid) && round + 1 < m_care.rounds;
 }
 
 void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelocities& solved) {
@@ -499,7 +537,7 @@ bool ContactResponse::releasePulling(int round) {
     for (const Touch& touch : m_touches) most = std::max(most, touch.normalImpulse);
     for (Touch& touch : m_touches) {
         if (!touch.active) continue;
-        if (touch.normalImpulse < -kPull * most && !touch.jammed && touch.changes < kMostChanges) {
+        if (touch.normalImpulse < -m_care.pull * most && !touch.jammed && touch.changes < kMostChanges) {
             touch.active = false;
             touch.lambda = 0.0;
             ++touch.changes;
@@ -511,19 +549,28 @@ bool ContactResponse::releasePulling(int round) {
     return changed && round + 1 < kMaxRounds;
 }
 
-bool ContactResponse::updateFriction(const CoupledSystem& system) {
-    if (++m_frictionRounds > kFrictionRounds) return false;
-    double most = 0.0;
-    for (const Touch& touch : m_touches) most = std::max(most, touch.contact.friction * touch.normalImpulse);
-    bool changed = false;
+/// `fresh`: of contacts only that have none yet.
+ContactResponse::FrictionChange ContactResponse::updateFriction(const CoupledSystem& system, bool fresh) {
+    if (!fresh && ++m_frictionRounds > kFrictionRounds) return {};
+    double most = 0.0, sum = 0.0, changed = 0.0, excess = 0.0;
+    for (const Touch& touch : m_touches) {
+        const double limit = touch.contact.friction * touch.normalImpulse;
+        most = std::max(most, limit);
+        sum += std::max(limit, 0.0);
+    }
+    bool isWorthIt = false;
     for (Touch& touch : m_touches) {
         const double limit = touch.contact.friction * touch.normalImpulse;
-        if (!touch.active || limit <= 0.0) continue;
+        if (!touch.active || limit <= 0.0 || (fresh && (touch.slip.known || touch.sticks))) continue;
         const double matters = kFrictionChange * std::max(limit, kMinor * most);
-        changed |= touch.sticks ? updateSticking(touch, matters, vertexStiffness(system, touch))
-                                : updateSliding(touch, matters);
+        const double force = (touch.impulse - touch.normalImpulse * touch.contact.normal).norm();
+        const double change = touch.sticks ? updateSticking(touch, matters, vertexStiffness(system, touch))
+                                           : updateSliding(touch, matters);
+        changed += change;
+        excess += std::max(0.0, force - limit);
+        isWorthIt |= change > matters;
     }
-    return changed;
+    return isWorthIt ? FrictionChange{changed / sum, excess / sum} : FrictionChange{};
 }
 
 /// Where contacts have not settled before the last solve, none may hold a body by more friction than there is: a light
@@ -538,16 +585,15 @@ void ContactResponse::dropExcessFriction() {
     }
 }
 
-/// A contact slides once more holds it than friction can. `matters`: change of impulse that is worth another solve
-/// [N s]; `stiffness`: impulse over velocity of its vertices [kg].
-bool ContactResponse::updateSticking(Touch& touch, double matters, double stiffness) const {
+/// A contact slides once more holds it than friction can. Returns the change of its impulse [N s]; `matters`: what is
+/// worth another solve [N s]; `stiffness`: impulse over velocity of its vertices [kg].
+double ContactResponse::updateSticking(Touch& touch, double matters, double stiffness) const {
     const double limit = touch.contact.friction * touch.normalImpulse;
     const Vec3 held = touch.impulse - touch.normalImpulse * touch.contact.normal;
     const double force = held.norm();
     if (force <= limit + 0.05 * matters) {
-        const bool creeps = touch.isRow && touch.kappa * touch.slide.norm() > matters;
         touch.slip.held = held;
-        return creeps;
+        return touch.isRow ? touch.kappa * touch.slide.norm() : 0.0;
     }
     touch.sticks = false;
     ++touch.flips;
@@ -555,11 +601,11 @@ bool ContactResponse::updateSticking(Touch& touch, double matters, double stiffn
     touch.slip.limit = limit;
     touch.slip.direction = -held / force;
     touch.slip.speed = (force - limit) / stiffness;  // what the excess would give these vertices alone
-    return true;
+    return std::max(limit, force - limit);
 }
 
 /// A contact sticks once friction turns its sliding around.
-bool ContactResponse::updateSliding(Touch& touch, double matters) const {
+double ContactResponse::updateSliding(Touch& touch, double matters) const {
     const Slip old = touch.slip;
     Slip& slip = touch.slip;
     slip.known = true;
@@ -570,14 +616,14 @@ bool ContactResponse::updateSliding(Touch& touch, double matters) const {
         touch.sticks = true;
         slip.held.setZero();
         ++touch.flips;
-        return true;
+        return slip.limit;
     }
     const bool damped = turns || touch.flips >= kMostFlips || slip.speed == 0.0;
     slip.direction = damped ? Vec3::Zero() : Vec3(touch.slide / slip.speed);
-    if (damped) slip.speed = std::max(slip.speed, old.speed);
+    if (damped && std::isfinite(old.speed)) slip.speed = std::max(slip.speed, old.speed);
     const double force = (touch.impulse - touch.normalImpulse * touch.contact.normal).norm();
-    if (force > kMostFriction * slip.limit + matters) return true;  // it slid much faster than was foreseen
-    return (slip.limit * slip.direction - (old.known ? old.limit : 0.0) * old.direction).norm() > matters;
+    if (force > kMostFriction * slip.limit + matters) return force;  // it slid much faster than was foreseen
+    return (slip.limit * slip.direction - (old.known ? old.limit : 0.0) * old.direction).norm();
 }
 
 void ContactResponse::moveToEnd(const IslandVelocities& solved, const Points& y) {
@@ -592,19 +638,41 @@ void ContactResponse::moveToEnd(const IslandVelocities& solved, const Points& y)
         m_endTwists[b] = m_dynamicIndex[b] < 0 ? m_input.bodies[b].freeTwist : Vec6(solved.w.col(m_dynamicIndex[b]));
 }
 
-bool ContactResponse::checkEnd(const IslandVelocities& solved, const Points& y, int round) {
+/// What is inside a body at the end of the solved motion, the deepest first, into m_found.
+void ContactResponse::findAtEnd(const IslandVelocities& solved, const Points& y) {
     moveToEnd(solved, y);
     std::vector<const Points*> positions;
     for (const Points& end : m_end) positions.push_back(&end);
     m_found.clear();
     m_input.contacts->find({positions, m_endTwists, m_input.h}, -m_vertexSlop, -m_faceSlop, m_found);
     std::sort(m_found.begin(), m_found.end(), [](const Contact& a, const Contact& b) { return a.gap < b.gap; });
+}
+
+bool ContactResponse::checkEnd(const IslandVelocities& solved, const Points& y, int round) {
+    findAtEnd(solved, y);
+    bool changed = closeFound(solved, round);
+    if (m_anyFast) changed |= closeFirst(round);
+    return changed && round + 1 < kMaxRounds;
+}
+
+bool ContactResponse::closeFound(const IslandVelocities& solved, int round) {
     m_deepestGap = 0.0;
     m_claimed.clear();
     bool changed = false;
     for (const Contact& contact : m_found) changed |= closeAtEnd(contact, solved, round);
-    if (m_anyFast) changed |= closeFirst(round);
-    return changed && round + 1 < kMaxRounds;
+    return changed;
+}
+
+bool ContactResponse::isAnyDeep() const {
+    return std::any_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
+        return missing(contact, touchOf(contact)) < -kDeep * m_edge[contact.shell];
+    });
+}
+
+/// What a contact at the end of the step lacks to where it may be, < 0: it stands deeper [m]. `touch`: the one that it
+/// belongs to, or -1.
+double ContactResponse::missing(const Contact& contact, int touch) const {
+    return touch < 0 ? contact.gap : contact.gap - m_touches[touch].offset - m_touches[touch].allowedGap;
 }
 
 /// The touch that a contact belongs to, -1: none. A point that has moved on to a neighbouring face is still the same.
@@ -625,20 +693,20 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     const bool fresh = known < 0;
     const bool held = !fresh && m_touches[known].active;
     const double slop = contact.isVertex() ? m_vertexSlop : m_faceSlop;
-    const double missing = fresh ? contact.gap : contact.gap - m_touches[known].offset - m_touches[known].allowedGap;
-    if (missing > -slop) return false;
+    const double lacks = missing(contact, known);
+    if (lacks > -slop) return false;
     if (!contact.isVertex() && !held) {
         // Nearly at a vertex, that says the same; and of features that share vertices the deepest comes first, for the
         // others may be cured with it.
         if (contact.weights.maxCoeff() > 1.0 - kNearEdge) return false;
-        m_deepestGap = std::min(m_deepestGap, missing);
-        if (liftVertices(contact, -missing)) return true;
+        m_deepestGap = std::min(m_deepestGap, lacks);
+        if (liftVertices(contact, -lacks, solved)) return true;
         for (int a = 0; a < 3; ++a)
             if (contact.weights[a] > 0.0 && m_claimed.count(globalVertex(contact, a))) return true;
         for (int a = 0; a < 3; ++a)
             if (contact.weights[a] > 0.0) m_claimed.insert(globalVertex(contact, a));
     }
-    m_deepestGap = std::min(m_deepestGap, missing);
+    m_deepestGap = std::min(m_deepestGap, lacks);
     if (fresh) {
         m_index[keyOf(contact)] = static_cast<int>(m_touches.size());
         m_touches.push_back(makeTouch(contact));
@@ -650,11 +718,12 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
         ++touch.changes;
     }
     if (held && round >= kFreezeRound) {
-        touch.target -= 0.7 * missing / m_input.h;
+        touch.target -= 0.7 * lacks / m_input.h;
         return true;
     }
     const bool turned =
         !fresh && contact.normal.dot(touch.contact.normal) < 0.0;  // it has passed the middle of the body
+    touch.startGap = std::numeric_limits<double>::quiet_NaN();
     const Vec3 firstNormal = touch.contact.normal;
     const double firstGap = touch.contact.gap;
     place(touch, contact);
@@ -663,15 +732,16 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
         touch.contact.gap = firstGap;
         touch.target = -std::max(firstGap, 0.0) / m_input.h;
     } else {
-        touch.target = relativeVelocity(touch, solved).dot(contact.normal) - missing / m_input.h;
+        touch.target = relativeVelocity(touch, solved).dot(contact.normal) - lacks / m_input.h;
     }
     return true;
 }
 
-/// Vertices that lie on a curved surface leave their chords inside it. They are lifted by as much, once; a row for
-/// every chord would only fight them. False when the vertices do not touch the body there: a body smaller than a
-/// triangle.
-bool ContactResponse::liftVertices(const Contact& contact, double by) {
+/// Vertices that lie on a curved surface, or close above it, leave their chords inside it. They are lifted by as much,
+/// once; a row for every chord would only fight them. False when the vertices do not touch the body there: a body
+/// smaller than a triangle.
+bool ContactResponse::liftVertices(const Contact& contact, double by, const IslandVelocities& solved) {
+    const double most = kMostOffset * m_edge[contact.shell];
     double carried = 0.0;
     std::array<Touch*, 3> touches{};
     for (int a = 0; a < 3; ++a) {
@@ -681,14 +751,22 @@ bool ContactResponse::liftVertices(const Contact& contact, double by) {
         const auto known = m_index.find(keyOf(vertex));
         if (known == m_index.end()) continue;
         Touch& touch = m_touches[known->second];
-        if (!touch.active || touch.contact.normal.dot(contact.normal) < 0.7) continue;
-        if (touch.offset + by > kMostOffset * m_edge[contact.shell]) continue;
+        if (touch.contact.normal.dot(contact.normal) < 0.7) continue;
+        if (!touch.active && !isQuick()) continue;
+        const double off = touch.active ? touch.offset : endGap(touch, solved);
+        if (!(off + by <= most) || (!touch.active && touch.changes >= kMostChanges)) continue;
         touches[a] = &touch;
         carried += contact.weights[a];
     }
     if (carried < 0.6) return false;
     for (Touch* touch : touches) {
         if (!touch || touch->lifted >= by) continue;
+        if (!touch->active) {
+            touch->offset = std::max(0.0, endGap(*touch, solved));
+            touch->target = (touch->offset - touch->startGap) / m_input.h;
+            touch->active = true;
+            ++touch->changes;
+        }
         touch->offset += by - touch->lifted;
         touch->target += (by - touch->lifted) / m_input.h;
         touch->lifted = by;
@@ -696,15 +774,65 @@ bool ContactResponse::liftVertices(const Contact& contact, double by) {
     return true;
 }
 
+/// What few rounds have left inside a body is pushed out of it along the normal. A sheet gives way to that nearly for
+/// nothing; a stiff one feels it in the next step.
+void ContactResponse::pushOut(Points& v, std::vector<ContactImpulse>& impulses) {
+    if (!m_input.contacts || !isQuick()) return;
+    std::map<int, Vec3> moved;
+    m_deepestGap = 0.0;
+    for (const Contact& contact : m_found) {
+        const double lacks = missing(contact, touchOf(contact));
+        if (lacks > -(contact.isVertex() ? m_vertexSlop : m_faceSlop)) continue;
+        const double by = std::min(-lacks, kMostPush * m_edge[contact.shell]);
+        m_deepestGap = std::min(m_deepestGap, lacks + by);
+        const Vec3 impulse = push(contact, by, moved);
+        if (impulse.isZero(0.0)) continue;
+        impulses.push_back({contact, impulse, false, Vec3::Zero()});
+        if (contact.isVertex()) m_memory[keyOf(contact)] = {impulse.norm(), 0.0, false, {}, contact.point, true};
+    }
+    for (const auto& [vertex, by] : moved) v.col(vertex) += by / m_input.h;
+}
+
+/// The impulse that moves a contact's point out along its normal, besides what its vertices have been moved by [N s].
+Vec3 ContactResponse::push(const Contact& contact, double by, std::map<int, Vec3>& moved) const {
+    const int corners = contact.isVertex() ? 1 : 3;
+    for (int a = 0; a < corners; ++a)
+        if (contact.weights[a] > 0.0 && m_held[globalVertex(contact, a)]) return Vec3::Zero();
+    const Shell& shell = *m_input.shells[contact.shell];
+    const double damped = 1.0 + m_input.h * shell.material().massDamping;
+    double impulse = 0.0;
+    for (int a = 0; a < corners; ++a) {
+        if (contact.weights[a] == 0.0) continue;
+        Vec3& before = moved.try_emplace(globalVertex(contact, a), Vec3::Zero()).first->second;
+        const double missing = by * contact.weights[a] / contact.weights.squaredNorm() - before.dot(contact.normal);
+        if (missing <= 0.0) continue;
+        before += missing * contact.normal;
+        impulse += shell.masses()[contact.vertices[a]] * damped * missing / m_input.h;
+    }
+    return impulse * contact.normal;
+}
+
+/// How far off the body a contact of the start ends; not a number if it was not seen at the start [m].
+double ContactResponse::endGap(const Touch& touch, const IslandVelocities& solved) const {
+    return touch.startGap + m_input.h * relativeVelocity(touch, solved).dot(touch.contact.normal);
+}
+
 void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
     m_memory.clear();
     m_memoryStep = m_input.h;
     for (const Touch& touch : m_touches) {
-        if (touch.impulse.isZero(0.0)) continue;  // took no part in the last solve
-        impulses.push_back({touch.contact, touch.impulse, touch.sticks, touch.slide});
-        if (touch.active && touch.normalImpulse > 0.0)
-            m_memory[keyOf(touch.contact)] = {touch.normalImpulse, touch.offset,        touch.sticks,
-                                              touch.slip,          touch.contact.point, touch.contact.isVertex()};
+        const bool pushes = touch.active && touch.normalImpulse > 0.0;
+        if (!touch.impulse.isZero(0.0))  // took part in the last solve
+            impulses.push_back({touch.contact, touch.impulse, touch.sticks, touch.slide});
+        // Vertices that come and go in a sliding sheet are not without friction in the step in which they come back.
+        const bool maySlideOn = isQuick() && touch.contact.isVertex() && (touch.slip.known || touch.sticks);
+        if (pushes || maySlideOn)
+            m_memory[keyOf(touch.contact)] = {pushes ? touch.normalImpulse : 0.0,
+                                              pushes ? touch.offset : 0.0,
+                                              touch.sticks,
+                                              touch.slip,
+                                              touch.contact.point,
+                                              touch.contact.isVertex()};
     }
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <map>
 #include <set>
 #include <tuple>
@@ -39,9 +40,18 @@ class ContactResponse {
     /// Turns held vertices and active contacts into constraints and rows.
     void writeTo(CoupledSystem& system);
     /// Reads a solve. True when the active set, a linearisation or friction changed so that another solve is needed.
-    bool update(const CoupledSystem& system, const IslandVelocities& solved, const Points& y, int round);
+    /// `rough`: the solve was not to the tolerance.
+    bool update(const CoupledSystem& system, const IslandVelocities& solved, const Points& y, int round, bool rough);
     /// Most negative gap that the last update predicted for the end of the step and that it wanted closed [m].
     double deepestGap() const { return m_deepestGap; }
+    /// Whether nothing rests on the contacts: they are then looked at once, after a rough solve, again only where a
+    /// vertex ends deep inside a body, and pushOut does what is left.
+    bool isQuick() const { return m_care.rounds < kMaxRounds; }
+    /// Whether anything is near.
+    bool hasContacts() const { return !m_touches.empty(); }
+    /// Moves vertices that end inside a body out of it, after finish. `v`: velocities of all vertices; `impulses`: what
+    /// that took is added.
+    void pushOut(Points& v, std::vector<ContactImpulse>& impulses);
     /// Contacts that carried an impulse; remembers them for the next step.
     void finish(std::vector<ContactImpulse>& impulses);
     double slop() const { return m_vertexSlop; }
@@ -63,7 +73,8 @@ class ContactResponse {
         Contact contact;
         Vec3 arm{0, 0, 0}, carried{0, 0, 0};
         int dynamicBody = -1;
-        double target = 0.0;      ///< least normal velocity relative to the body [m/s]
+        double target = 0.0;  ///< least normal velocity relative to the body [m/s]
+        double startGap = std::numeric_limits<double>::quiet_NaN();  ///< of a contact as the start found it [m]
         double allowedGap = 0.0;  ///< <= 0: what it stood inside at the start and need not leave at once [m]
         bool active = false, sticks = false, isRow = false;
         double lambda = 0.0, kappa = 0.0;  ///< soft rows: multiplier [N s] and penalty [kg]
@@ -77,6 +88,13 @@ class ContactResponse {
         Vec3 slide{0, 0, 0};    ///< tangential velocity relative to the body in the last solve [m/s]
         int changes = 0;        ///< how often it was activated or dropped
     };
+    /// How exactly a step's contacts are settled; what remains is left to the next step.
+    struct Care {
+        int rounds;   ///< solves, at most
+        double pull;  ///< of the largest impulse: a contact that pulls less may stay for the step
+    };
+    static constexpr Care kInFull{kMaxRounds, 1e-3};
+    static constexpr Care kAmongWalls{6, 0.02};
     using Key = std::tuple<const void*, const void*, int>;  ///< shell, body, feature
     struct Memory {
         double impulse, offset;
@@ -115,19 +133,34 @@ class ContactResponse {
     bool isPinched(const VertexFilter& filter, double& target) const;
     void finishFilter(VertexFilter& filter, VertexConstraint& constraint, std::vector<SoftRow>& rows);
     SoftRow makeRow(Touch& touch, const CoupledSystem& system) const;
+    double pinchedMass(const Touch& touch) const;
     double vertexStiffness(const CoupledSystem& system, const Touch& touch) const;
     void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);
     bool releasePulling(int round);
     void addFriction(const Touch& touch, Mat3& damping, Vec3& load) const;
-    bool updateFriction(const CoupledSystem& system);
+    /// Shares of all friction: what has changed, and what is more than Coulomb allows. Both 0 unless some contact's
+    /// change is worth another solve by itself.
+    struct FrictionChange {
+        double share = 0.0, excess = 0.0;
+    };
+    FrictionChange updateFriction(const CoupledSystem& system, bool fresh);
+    bool updateQuickly(const CoupledSystem& system, const IslandVelocities& solved, const Points& y, int round,
+                       bool rough);
+    bool closeFound(const IslandVelocities& solved, int round);
+    bool isAnyDeep() const;
+    double missing(const Contact& contact, int touch) const;
     void dropExcessFriction();
-    bool updateSticking(Touch& touch, double matters, double stiffness) const;
-    bool updateSliding(Touch& touch, double matters) const;
+    double updateSticking(Touch& touch, double matters, double stiffness) const;
+    double updateSliding(Touch& touch, double matters) const;
     double slowest() const { return 1e-3 * m_input.h * std::max(m_input.gravity.norm(), 1e-3); }
+    bool isAmongWalls() const;
+    void findAtEnd(const IslandVelocities& solved, const Points& y);
+    Vec3 push(const Contact& contact, double by, std::map<int, Vec3>& moved) const;
     bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
     int touchOf(const Contact& contact) const;
     bool closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round);
-    bool liftVertices(const Contact& contact, double by);
+    bool liftVertices(const Contact& contact, double by, const IslandVelocities& solved);
+    double endGap(const Touch& touch, const IslandVelocities& solved) const;
     int globalVertex(const Contact& c, int corner) const { return m_offsets[c.shell] + c.vertices[corner]; }
 
     IslandInput m_input;
@@ -146,6 +179,7 @@ class ContactResponse {
     bool m_anyFast = false;
     std::vector<Contact> m_found;
     std::set<int> m_claimed;  ///< vertices of the soft rows that this round has added
+    Care m_care = kInFull;
     double m_vertexSlop = 0.0, m_faceSlop = 0.0, m_deepestGap = 0.0;
     int m_frictionRounds = 0;
     std::vector<VertexFilter> m_filters;
