@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "EdgeStretch.h"
 #include "ShellAssembly.h"
 #include "contact/ContactResponse.h"
 #include "solver/BodySupports.h"
@@ -48,6 +49,8 @@ struct IslandSolver::Impl {
     CoupledVector u, reference;
     Eigen::Matrix<double, 6, Eigen::Dynamic> freeTwist;
     int lastRounds = 1;         ///< changes of the contacts in the last step, and one
+    mutable Points at;                           ///< where velocities lead one shell
+    mutable std::vector<double> elasticAtStart;  ///< of each shell at the start of the step; NaN: not yet asked for [J]
     double impulseShare = 1.0;  ///< of the solved contacts that a step cut short takes: see limitDeformation
 
     void gather(const IslandInput& input);
@@ -55,6 +58,7 @@ struct IslandSolver::Impl {
     void assemble(const IslandInput& input, bool atEnd);
     void readFreeTwists();
     bool overstretches(const IslandInput& input) const;
+    double elasticEnergyAfter(const IslandInput& input, std::size_t shell, const Points& velocities) const;
     double energyGain(const IslandInput& input) const;
     bool bodiesLead(const IslandInput& input) const;
     void limitDeformation(const IslandInput& input, StepReport& report);
@@ -107,6 +111,7 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
     y.setZero(3, count);
     from = start;
     stepOf.assign(input.shells.size(), input.h);
+    elasticAtStart.assign(input.shells.size(), std::numeric_limits<double>::quiet_NaN());
     for (std::size_t k = 0; k < input.shells.size(); ++k)
         if (input.bodies.empty()) beginTwoStep(input, k);
     dynamicIndex.assign(input.bodies.size(), -1);
@@ -205,9 +210,16 @@ double IslandSolver::Impl::incrementalPotential(const IslandInput& input, const 
         for (int i = 0; i < n; ++i)
             sum += shell.masses()[i] * (0.5 * since.col(i).squaredNorm() - stepOf[k] * input.gravity.dot(part.col(i))) -
                    stepOf[k] * shell.forces().col(i).dot(part.col(i));
-        sum += shell.elasticEnergy(shell.positions() + y.middleCols(offsets[k], n) + stepOf[k] * part);
+        sum += elasticEnergyAfter(input, k, velocities);
     }
     return sum;
+}
+
+double IslandSolver::Impl::elasticEnergyAfter(const IslandInput& input, std::size_t k, const Points& velocities) const {
+    const Shell& shell = *input.shells[k];
+    const int n = shell.vertexCount();
+    at = shell.positions() + y.middleCols(offsets[k], n) + stepOf[k] * velocities.middleCols(offsets[k], n);
+    return shell.elasticEnergy(at);
 }
 
 /// Whether the solved step must be linearised again: it stretches an edge by far, or it gains energy. Backward Euler
@@ -218,15 +230,11 @@ bool IslandSolver::Impl::overstretches(const IslandInput& input) const {
     bool suspect = false;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
-        const Points &x = shell.positions(), &rest = shell.restPositions();
-        for (const auto& e : shell.mesh().edges()) {
-            const Vec3 now = x.col(e.v1) - x.col(e.v0);
-            const Vec3 then = now + stepOf[k] * (v.col(offsets[k] + e.v1) - v.col(offsets[k] + e.v0));
-            const double length = (rest.col(e.v1) - rest.col(e.v0)).norm(), lengthNow = now.norm(),
-                         lengthThen = then.norm();
-            if (lengthThen > std::max(lengthNow, length) + kMost * length) return true;
-            suspect = suspect || std::abs(lengthThen - lengthNow) > kSuspect * length;
-        }
+        const auto edges = shell.mesh().edges();
+        const EdgeStretch stretch = edgeStretch(edges.data(), static_cast<int>(edges.size()), shell.m_restLength.data(),
+                                                shell.positions().data(), v.data() + 3 * offsets[k], stepOf[k]);
+        if (stretch.lengthening > kMost) return true;
+        suspect = suspect || stretch.change > kSuspect;
     }
     return suspect && energyGain(input) > (dynamicBodies.empty() ? kEnergyGainAlone : kEnergyGain);
 }
@@ -323,9 +331,9 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
             pushed += 0.5 * shell.masses()[i] * part.col(i).squaredNorm() - stepOf[k] * load.dot(mean);
             gain += 0.5 * shell.masses()[i] * part.col(i).squaredNorm() - kinetic - stepOf[k] * load.dot(mean);
         }
-        const double elastic = shell.elasticEnergy(shell.positions());
-        atStart += elastic;
-        gain += shell.elasticEnergy(shell.positions() + y.middleCols(offsets[k], n) + stepOf[k] * part) - elastic;
+        if (std::isnan(elasticAtStart[k])) elasticAtStart[k] = shell.elasticEnergy(shell.positions());
+        atStart += elasticAtStart[k];
+        gain += elasticEnergyAfter(input, k, v) - elasticAtStart[k];
     }
     Eigen::Matrix<double, 6, Eigen::Dynamic> freeMomentum, momentum;
     system.momentum(freeTwist, freeMomentum);
@@ -356,7 +364,7 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
     std::vector<CoupledSystem::ShellPart> parts;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const int n = input.shells[k]->vertexCount();
-        const Points ahead = atEnd ? Points(v.middleCols(offsets[k], n)) : Points();
+        const Eigen::Ref<const Points> ahead = (atEnd ? v : start).middleCols(offsets[k], n);
         const StepSystem& step = input.shells[k]->m_assembly->assemble(
             *input.shells[k], stepOf[k], input.gravity, input.wind, from.middleCols(offsets[k], n),
             y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr);

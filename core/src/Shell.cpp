@@ -79,6 +79,10 @@ void Shell::setMasses() {
 }
 
 void Shell::rebuild() {
+    const auto edges = m_mesh->edges();
+    m_restLength.resize(static_cast<Eigen::Index>(edges.size()));
+    for (std::size_t i = 0; i < edges.size(); ++i)
+        m_restLength[i] = (m_rest.col(edges[i].v1) - m_rest.col(edges[i].v0)).norm();
     m_assembly = std::make_unique<ShellAssembly>(*this, *m_design);
 }
 
@@ -179,9 +183,9 @@ Vec3 Shell::angularMomentum(const Vec3& about) const {
 
 double Shell::maxStretch() const {
     double most = 0.0;
-    for (const auto& e : m_mesh->edges())
-        most =
-            std::max(most, (m_x.col(e.v0) - m_x.col(e.v1)).norm() / (m_rest.col(e.v0) - m_rest.col(e.v1)).norm() - 1.0);
+    const auto edges = m_mesh->edges();
+    for (std::size_t i = 0; i < edges.size(); ++i)
+        most = std::max(most, (m_x.col(edges[i].v0) - m_x.col(edges[i].v1)).norm() / m_restLength[i] - 1.0);
     return most;
 }
 

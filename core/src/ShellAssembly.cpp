@@ -38,10 +38,12 @@ ShellAssembly::ShellAssembly(const Shell& shell, const ShellDesign& design)
                                .flattened = design.flattened},
                               design.materials, shell.settings())) {
     std::vector<std::pair<int, int>> pairs;
+    pairs.reserve(2 * shell.mesh().edges().size());
     for (const auto& edge : shell.mesh().edges()) pairs.emplace_back(edge.v0, edge.v1);  // wind, soft rows
     for (const auto& energy : m_energies) energy->collectPairs(pairs);
     m_system.matrix.setPattern(shell.mesh().vertexCount(), std::move(pairs));
     for (const auto& energy : m_energies) energy->bind(m_system.matrix);
+    m_triangleSlots.reserve(shell.mesh().triangleCount());
     for (int t = 0; t < shell.mesh().triangleCount(); ++t)
         m_triangleSlots.push_back(stencilSlots<3>(m_system.matrix, cornersOf(shell, t)));
     for (const auto& energy : m_energies)
@@ -51,25 +53,29 @@ ShellAssembly::ShellAssembly(const Shell& shell, const ShellDesign& design)
 /// At most one energy has a constant Hessian.
 void ShellAssembly::splitConstant(const ConstantHessian& hessian) {
     const BlockMatrix& matrix = m_system.matrix;
-    Constant split{.near = {}, .diagonal = hessian.diagonal(), .beside = {}};
-    std::vector<Eigen::Triplet<double>> beside;
-    for (int row = 0; row < hessian.rows(); ++row)
+    ConstantPart& split = m_constant.emplace();
+    split.lower.assign(matrix.lower().size(), 0.0);
+    split.diagonal = hessian.diagonal();
+    ConstantHessian& beside = split.beside;
+    beside.resize(hessian.rows(), hessian.cols());
+    beside.reserve(hessian.nonZeros());
+    for (int row = 0; row < hessian.rows(); ++row) {
+        beside.startVec(row);
         for (ConstantHessian::InnerIterator it(hessian, row); it; ++it) {
             const int column = static_cast<int>(it.col());
             if (row == column) continue;
             if (!matrix.contains(std::max(row, column), std::min(row, column)))
-                beside.emplace_back(row, column, it.value());
+                beside.insertBack(row, column) = it.value();
             else if (row > column)
-                split.near.emplace_back(matrix.slot(row, column), it.value());
+                split.lower[matrix.slot(row, column)] = it.value();
         }
-    split.beside.resize(hessian.rows(), hessian.cols());
-    split.beside.setFromTriplets(beside.begin(), beside.end());
-    m_constant = std::move(split);
+    }
+    beside.finalize();
+    beside.data().squeeze();
 }
 
 void ShellAssembly::addEnergies(const Points& x, HessianKind kind) {
     for (const auto& energy : m_energies) energy->addTo(m_system, x, kind);
-    if (m_constant) m_system.addConstant(m_constant->near, m_constant->diagonal, m_constant->beside);
 }
 
 PlasticFlow ShellAssembly::flow(const Points& x) {
@@ -86,7 +92,7 @@ PlasticFlow ShellAssembly::flow(const Points& x) {
 
 const StepSystem& ShellAssembly::assembleStatic(const Shell& shell, const Vec3& gravity, double load,
                                                 HessianKind kind) {
-    m_system.begin(1.0, 0.0);  // a step of 1 s without mass: A = K, b = f
+    m_system.begin(1.0, 0.0, constant());  // a step of 1 s without mass: A = K, b = f
     addEnergies(shell.positions(), kind);
     addLoads(shell, gravity, load);
     if (kind == HessianKind::Exact && shell.pressure() != 0.0) addPressureStiffness(shell, load * shell.pressure());
@@ -112,12 +118,13 @@ void ShellAssembly::addPressureStiffness(const Shell& shell, double pressure) {
 }
 
 const StepSystem& ShellAssembly::assemble(const Shell& shell, double h, const Vec3& gravity, const Wind* wind,
-                                          const Points& start, const Eigen::Ref<const Points>& y, const Points* ahead) {
+                                          const Eigen::Ref<const Points>& start, const Eigen::Ref<const Points>& y,
+                                          const Eigen::Ref<const Points>* ahead) {
     if (ahead) m_end = shell.positions() + h * *ahead + y;
-    m_system.begin(h, shell.material().stiffnessDamping);                   // A = 0, b = 0
+    m_system.begin(h, shell.material().stiffnessDamping, constant());       // A = (h^2 + h beta) K_constant, b = 0
     addEnergies(ahead ? m_end : shell.positions(), HessianKind::Positive);  // A += (h^2 + h beta) K, b += h f
     if (ahead)
-        m_system.addAlteration(-h * *ahead);  // b += h^2 K v', linearised at the end
+        m_system.addAlteration(*ahead, -h);  // b += h^2 K v', linearised at the end
     else if (!y.isZero(0.0))
         m_system.addAlteration(y);                                          // b -= h K y
     addLoads(shell, gravity, 1.0);                                          // b += h f_ext

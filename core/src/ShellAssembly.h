@@ -25,8 +25,9 @@ class ShellAssembly {
     /// A and b of the step from the shell's present state; valid until the next call. With `ahead`, an estimate of the
     /// velocities at the end of the step, the energies are linearised at the end that it leads to: one more Newton
     /// step.
-    const StepSystem& assemble(const Shell& shell, double h, const Vec3& gravity, const Wind* wind, const Points& start,
-                               const Eigen::Ref<const Points>& y, const Points* ahead = nullptr);
+    const StepSystem& assemble(const Shell& shell, double h, const Vec3& gravity, const Wind* wind,
+                               const Eigen::Ref<const Points>& start, const Eigen::Ref<const Points>& y,
+                               const Eigen::Ref<const Points>* ahead = nullptr);
     /// K and the unbalanced force in `rhs`, at the shell's positions, under `load` times gravity, forces and pressure.
     const StepSystem& assembleStatic(const Shell& shell, const Vec3& gravity, double load, HessianKind kind);
     const Energy& membrane() const { return *m_energies[0]; }
@@ -37,18 +38,13 @@ class ShellAssembly {
   private:
     void addPressureStiffness(const Shell& shell, double pressure);
     void splitConstant(const ConstantHessian& hessian);
+    const ConstantPart* constant() const { return m_constant ? &*m_constant : nullptr; }
     void addEnergies(const Points& x, HessianKind kind);
     void addLoads(const Shell& shell, const Vec3& gravity, double load);
     void addWind(const Shell& shell, const Wind& wind);
     std::vector<std::unique_ptr<Energy>> m_energies;  ///< membrane, then bending
     StepSystem m_system;
-    /// Constant Hessians, split by whether the matrix' pattern has their entries.
-    struct Constant {
-        std::vector<std::pair<int, double>> near;
-        Eigen::VectorXd diagonal;
-        ConstantHessian beside;
-    };
-    std::optional<Constant> m_constant;
+    std::optional<ConstantPart> m_constant;
     Points m_end;  ///< where `ahead` leads
     std::vector<std::array<int, 3>> m_triangleSlots;
 };

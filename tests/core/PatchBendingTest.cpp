@@ -121,7 +121,8 @@ TEST_P(PatchBendingOn, AffineMapsOfAFlatSheetStoreNothing) {
 }
 
 TEST_P(PatchBendingOn, AQuadraticHeightHasItsCurvatureInEveryTriangle) {
-    const Sheet s(sheet(GetParam(), 1.0, 0.8, 10, 8));
+    const Sheet s(sheet(GetParam(), 1.0, 0.8, 10, 8), {}, /*yields=*/true);  // keeps every triangle's patch
+    const Sheet elastic(sheet(GetParam(), 1.0, 0.8, 10, 8));
     constexpr double kSmall = 1e-4;                                      // slopes whose squares are rounding
     const double a = 1.0 * kSmall, b = -0.7 * kSmall, c = 0.4 * kSmall;  // w_xx, w_yy, w_xy
     const Points x =
@@ -135,6 +136,9 @@ TEST_P(PatchBendingOn, AQuadraticHeightHasItsCurvatureInEveryTriangle) {
     const double density =
         0.5 * kStiffness * ((1 - kPoisson) * (a * a + b * b + 2 * c * c) + kPoisson * (a + b) * (a + b));
     EXPECT_NEAR(s.energy.value(x), density * 0.8, 1e-9 * density);
+    EXPECT_NEAR(elastic.energy.value(x), density * 0.8, 1e-9 * density);
+    const Points far = rotated(x).colwise() + Vec3(1e3, 2e3, -1e3);
+    EXPECT_NEAR(elastic.energy.value(far), s.energy.value(far), 1e-9 * density + 1e-4 * s.energy.value(far));
 }
 
 TEST_P(PatchBendingOn, ACurvedSheetIsAtRestAtRestAndWhereItIsTurned) {

@@ -179,6 +179,7 @@ class Shell {
     Points m_lastX, m_lastV;  ///< a step ago, for BDF2
     double m_lastH = 0.0;     ///< length of that step; 0: there is none [s]
     Eigen::VectorXd m_mass, m_restArea;
+    Eigen::VectorXd m_restLength;  ///< of the mesh's edges [m]
     std::vector<char> m_pinned;
     std::vector<Vec3> m_pinTarget;
     std::vector<Mat3> m_freedom;  ///< of guided vertices; empty while there are none

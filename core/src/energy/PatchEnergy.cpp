@@ -3,22 +3,19 @@
 #include <Eigen/Dense>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+
+#include "Kernel.h"
 
 namespace jacket {
 namespace {
 
-/// Unit normal of a triangle, and how it turns: moving corner j by d adds -slope_j (n . d).
-struct Normal {
-    Vec3 n;
-    Mat3 slopes;  ///< gradients of the corners' hat functions, a column each [1/m]
-};
-
-Normal normalOf(const std::vector<int>& v, const Points& x) {
+TriangleNormal normalOf(const int* v, const Points& x) {
     const Vec3 x0 = x.col(v[0]), x1 = x.col(v[1]), x2 = x.col(v[2]);
     const Vec3 twiceArea = (x1 - x0).cross(x2 - x0);
     const double length2 = std::max(twiceArea.squaredNorm(), 1e-300);
-    Normal result{twiceArea / std::sqrt(length2), {}};
+    TriangleNormal result{twiceArea / std::sqrt(length2), {}};
     const Vec3 scaled = twiceArea / length2;
     result.slopes << scaled.cross(x2 - x1), scaled.cross(x0 - x2), scaled.cross(x1 - x0);
     return result;
@@ -28,31 +25,84 @@ double norm(const Vec3& k) {  // of a symmetric tensor given as uu, vv, uv
     return std::sqrt(k[0] * k[0] + k[1] * k[1] + 2.0 * k[2] * k[2]);
 }
 
-}  // namespace
+/// A matrix of scalars by rows, and positions in fours.
+struct ConstantRows {
+    const int *start, *column;
+    const double *value, *x;
+    int count;
+};
 
-PatchEnergy::PatchEnergy(const HalfEdgeMesh& mesh, const RestShape& rest, std::vector<Plate> plates)
-    : m_plates(std::move(plates)), m_elements(mesh.triangleCount()) {
-    const MirroredMesh mirrored(mesh, rest.mirrors, rest.rigid);
-    const std::vector<Patch> patches = makePatches(mesh, mirrored, rest.positions);
-    for (int t = 0; t < mesh.triangleCount(); ++t) setUp(t, mirrored, patches[t], rest);
-    assembleConstant(mesh.vertexCount());
+/// Row i of the matrix times the positions. Its sum is zero, so differences to x_i do: they lose no digits far from the
+/// origin.
+JACKET_INLINE void multiplyRow(const ConstantRows& rows, int i, double (&sum)[4]) {
+    const double* const xi = rows.x + 4 * i;
+    for (double& s : sum) s = 0.0;
+    for (int k = rows.start[i]; k < rows.start[i + 1]; ++k) {
+        const double* const xj = rows.x + 4 * rows.column[k];
+        for (int c = 0; c < 4; ++c) sum[c] += rows.value[k] * (xj[c] - xi[c]);
+    }
 }
 
-Mat3 PatchEnergy::plateMatrix(int triangle) const {
-    const auto& [stiffness, nu, yield, hardening] = m_plates[triangle];
+/// to += factor K x, by three numbers a vertex.
+JACKET_KERNEL void addConstantGradient(const ConstantRows& rows, double factor, double* to) {
+    for (int i = 0; i < rows.count; ++i) {
+        double sum[4];
+        multiplyRow(rows, i, sum);
+        for (int c = 0; c < 3; ++c) to[3 * i + c] += factor * sum[c];
+    }
+}
+
+/// x . K x
+JACKET_KERNEL double constantProduct(const ConstantRows& rows) {
+    double product[4] = {};
+    for (int i = 0; i < rows.count; ++i) {
+        double sum[4];
+        multiplyRow(rows, i, sum);
+        for (int c = 0; c < 4; ++c) product[c] += sum[c] * rows.x[4 * i + c];
+    }
+    return product[0] + product[1] + product[2];
+}
+
+}  // namespace
+
+PatchEnergy::PatchEnergy(const HalfEdgeMesh& mesh, const RestShape& rest, const std::vector<Plate>& plates) {
+    const MirroredMesh mirrored(mesh, rest.mirrors, rest.rigid);
+    {
+        const std::vector<Patch> patches = makePatches(mesh, mirrored, rest.positions);
+        m_elements.reserve(patches.size());
+        for (int t = 0; t < mesh.triangleCount(); ++t) setUp(t, plates[t], mirrored, patches[t], rest);
+    }
+    assembleConstant(mesh.vertexCount());
+    const auto isFlatForGood = [](const Element& e) { return !e.isCurved() && !e.canYield(); };
+    if (!rest.flattened && std::all_of(m_elements.begin(), m_elements.end(), isFlatForGood)) keepMirroredOnly(rest);
+    m_padded.setZero(4, mesh.vertexCount());
+}
+
+Mat3 PatchEnergy::Element::plateMatrix() const {
+    const double nu = plate.poisson;
     Mat3 c;
     c << 1.0, nu, 0.0, nu, 1.0, 0.0, 0.0, 0.0, 2.0 * (1.0 - nu);
-    return stiffness * m_elements[triangle].area * c;
+    return plate.stiffness * area * c;
+}
+
+bool PatchEnergy::Element::canYield() const {
+    return std::isfinite(plate.yieldCurvature);
+}
+
+const PatchEnergy::Element& PatchEnergy::elementOf(int triangle) const {
+    assert(m_flatRest.cols() == 0);
+    return m_elements[triangle];
 }
 
 /// Splits the rest patch's second derivatives into curvature times normal and a share in the triangle's plane, which
 /// follows the triangle's two edges: subtracting that from B leaves nothing at rest, and turns and stretches with the
 /// shell.
-void PatchEnergy::setUp(int triangle, const MirroredMesh& mesh, const Patch& patch, const RestShape& shape) {
+void PatchEnergy::setUp(int triangle, const Plate& plate, const MirroredMesh& mesh, const Patch& patch,
+                        const RestShape& shape) {
     constexpr double kFlat = 1e-9;  // curvature times patch size that is rounding
     const Points& rest = shape.positions;
-    Element& e = m_elements[triangle];
-    e.area = patch.area;
+    Element& e = m_elements.emplace_back(Element{.triangle = triangle, .plate = plate, .area = patch.area});
+    e.vertices = static_cast<int>(m_vertices.size());
     SecondDerivatives rows = patch.derivatives;
     Vectors bent = Vectors::Zero();
     for (std::size_t k = 0; k < patch.nodes.size(); ++k) {
@@ -70,218 +120,308 @@ void PatchEnergy::setUp(int triangle, const MirroredMesh& mesh, const Patch& pat
         rows.col(0) += (inPlane.row(0) + inPlane.row(1)).transpose();
     }
     const auto isImage = [&](int node) { return mesh.node(node).image != 0; };
-    if (std::none_of(patch.nodes.begin(), patch.nodes.end(), isImage)) {
-        for (const int i : patch.nodes) e.vertices.push_back(mesh.node(i).vertex);
-        e.rows = std::move(rows);
-        return;
+    if (std::any_of(patch.nodes.begin(), patch.nodes.end(), isImage)) return setUpMirrored(e, mesh, patch, rows);
+    e.rows = static_cast<int>(m_rows.size());
+    e.vertexCount = static_cast<int>(patch.nodes.size());
+    for (std::size_t k = 0; k < patch.nodes.size(); ++k) {
+        m_vertices.push_back(mesh.node(patch.nodes[k]).vertex);
+        m_rows.push_back(rows.col(k));
     }
+}
+
+void PatchEnergy::setUpMirrored(Element& e, const MirroredMesh& mesh, const Patch& patch,
+                                const SecondDerivatives& rows) {
     e.mirrored = static_cast<int>(m_mirrored.size());
     Mirrored m{.rows = {}, .offset = Eigen::Matrix<double, 9, 1>::Zero(), .hessian = {}};
     m.rows.setZero(9, 3 * patch.nodes.size());
     for (std::size_t k = 0; k < patch.nodes.size(); ++k) {
         const auto [vertex, image] = mesh.node(patch.nodes[k]);
-        auto found = std::find(e.vertices.begin(), e.vertices.end(), vertex);
-        const auto column = found - e.vertices.begin();
-        if (found == e.vertices.end()) e.vertices.push_back(vertex);
+        const auto begin = m_vertices.begin() + e.vertices, found = std::find(begin, m_vertices.end(), vertex);
+        const auto column = found - begin;
+        if (found == m_vertices.end()) m_vertices.push_back(vertex);
         for (int ab = 0; ab < 3; ++ab) {
             m.rows.block<3, 3>(3 * ab, 3 * column) += rows(ab, k) * mesh.worldImage(image).linear;
             m.offset.segment<3>(3 * ab) += rows(ab, k) * mesh.worldImage(image).offset;
         }
     }
-    m.rows.conservativeResize(9, 3 * e.vertices.size());
+    e.vertexCount = static_cast<int>(m_vertices.size()) - e.vertices;
+    m.rows.conservativeResize(9, 3 * e.vertexCount);
+    const Mat3 plate = e.plateMatrix();
+    Eigen::Matrix<double, 9, 9> wide;
+    for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b) wide.block<3, 3>(3 * a, 3 * b) = plate(a, b) * Mat3::Identity();
+    m.hessian.reserve(e.vertexCount * (e.vertexCount + 1) / 2);
+    for (int j = 0; j < e.vertexCount; ++j)
+        for (int i = j; i < e.vertexCount; ++i)
+            m.hessian.push_back(m.rows.middleCols<3>(3 * i).transpose() * wide * m.rows.middleCols<3>(3 * j));
     m_mirrored.push_back(std::move(m));
 }
 
+/// Row by row from the patches around each vertex, as a list of all patches' entries would be ten times the matrix.
 void PatchEnergy::assembleConstant(int vertexCount) {
-    std::vector<Eigen::Triplet<double>> entries;
-    for (std::size_t t = 0; t < m_elements.size(); ++t) {
-        const Element& e = m_elements[t];
-        const Mat3 plate = plateMatrix(static_cast<int>(t));
-        if (e.mirrored >= 0) {
-            Mirrored& m = m_mirrored[e.mirrored];
-            Eigen::Matrix<double, 9, 9> wide;
-            for (int a = 0; a < 3; ++a)
-                for (int b = 0; b < 3; ++b) wide.block<3, 3>(3 * a, 3 * b) = plate(a, b) * Mat3::Identity();
-            m.hessian = m.rows.transpose() * wide * m.rows;
-            continue;
-        }
-        const Eigen::MatrixXd local = e.rows.transpose() * plate * e.rows;
-        for (std::size_t i = 0; i < e.vertices.size(); ++i)
-            for (std::size_t j = 0; j < e.vertices.size(); ++j)
-                entries.emplace_back(e.vertices[i], e.vertices[j], local(i, j));
-    }
+    std::vector<int> start(vertexCount + 1, 0), patchOf, placeIn;
+    const auto forVertices = [&](const auto& visit) {
+        for (std::size_t t = 0; t < m_elements.size(); ++t)
+            if (m_elements[t].mirrored < 0)
+                for (int i = 0; i < m_elements[t].vertexCount; ++i) visit(static_cast<int>(t), i);
+    };
+    const auto vertexAt = [&](int t, int i) { return verticesOf(m_elements[t])[i]; };
+    forVertices([&](int t, int i) { ++start[vertexAt(t, i) + 1]; });
+    for (int v = 0; v < vertexCount; ++v) start[v + 1] += start[v];
+    patchOf.resize(start[vertexCount]);
+    placeIn.resize(start[vertexCount]);
+    std::vector<int> next(start.begin(), start.end() - 1);
+    forVertices([&](int t, int i) {
+        const int k = next[vertexAt(t, i)]++;
+        patchOf[k] = t;
+        placeIn[k] = i;
+    });
+
+    std::vector<double> row(vertexCount, 0.0);
+    std::vector<int> columns;
+    std::vector<char> isIn(vertexCount, 0);
     m_constant.resize(vertexCount, vertexCount);
-    m_constant.setFromTriplets(entries.begin(), entries.end());
+    m_constant.reserve(static_cast<Eigen::Index>(20) * vertexCount);
+    for (int v = 0; v < vertexCount; ++v) {
+        columns.clear();
+        for (int k = start[v]; k < start[v + 1]; ++k) {
+            const Element& e = m_elements[patchOf[k]];
+            const Vec3 weighted = e.plateMatrix() * rowsOf(e)[placeIn[k]];
+            for (int i = 0; i < e.vertexCount; ++i) {
+                const int column = verticesOf(e)[i];
+                if (!isIn[column]) columns.push_back(column);
+                isIn[column] = 1;
+                row[column] += weighted.dot(rowsOf(e)[i]);
+            }
+        }
+        std::sort(columns.begin(), columns.end());
+        m_constant.startVec(v);
+        for (const int column : columns) {
+            m_constant.insertBack(v, column) = row[column];
+            row[column] = 0.0;
+            isIn[column] = 0;
+        }
+    }
+    m_constant.finalize();
+    m_constant.data().squeeze();
+}
+
+/// Of a shell that is flat for good the constant Hessian says all, but what mirrored patches do.
+void PatchEnergy::keepMirroredOnly(const RestShape& rest) {
+    std::vector<int> vertices;
+    std::vector<Element> elements;
+    for (Element e : m_elements) {
+        if (e.mirrored < 0) continue;
+        const int* const own = verticesOf(e);
+        e.vertices = static_cast<int>(vertices.size());
+        vertices.insert(vertices.end(), own, own + e.vertexCount);
+        elements.push_back(e);
+    }
+    elements.shrink_to_fit();
+    vertices.shrink_to_fit();
+    m_elements = std::move(elements);
+    m_vertices = std::move(vertices);
+    m_rows = {};
+    m_flatRest = rest.positions.colwise() - rest.positions.rowwise().mean();
+    m_inverseMoments =
+        Mat3(m_flatRest * m_flatRest.transpose()).completeOrthogonalDecomposition().pseudoInverse();  // rank 2
 }
 
 /// How many of a patch's vertices, its own corners first, share blocks with all of it.
-std::size_t PatchEnergy::columnsOf(std::size_t triangle) const {
-    const Element& e = m_elements[triangle];
-    if (e.mirrored >= 0) return e.vertices.size();
-    return std::isfinite(m_plates[triangle].yieldCurvature) || !e.curvature.isZero(0.0) ? 3 : 0;
+int PatchEnergy::columnsOf(const Element& e) const {
+    if (e.mirrored >= 0) return e.vertexCount;
+    return e.canYield() || e.isCurved() ? 3 : 0;
 }
 
 void PatchEnergy::collectPairs(std::vector<std::pair<int, int>>& pairs) const {
-    for (std::size_t t = 0; t < m_elements.size(); ++t) {
-        const Element& e = m_elements[t];
-        for (std::size_t j = 0; j < columnsOf(t); ++j)
-            for (std::size_t i = j + 1; i < e.vertices.size(); ++i) pairs.emplace_back(e.vertices[i], e.vertices[j]);
+    for (const Element& e : m_elements) {
+        const int* const v = verticesOf(e);
+        for (int j = 0; j < columnsOf(e); ++j)
+            for (int i = j + 1; i < e.vertexCount; ++i) pairs.emplace_back(v[i], v[j]);
     }
 }
 
 void PatchEnergy::bind(const BlockMatrix& matrix) {
-    m_slots.assign(m_elements.size(), {});
-    for (std::size_t t = 0; t < m_elements.size(); ++t) {
-        const Element& e = m_elements[t];
-        for (std::size_t j = 0; j < columnsOf(t); ++j)
-            for (std::size_t i = j + 1; i < e.vertices.size(); ++i)
-                m_slots[t].push_back(pairSlot(matrix, e.vertices[i], e.vertices[j]));
+    m_slots.clear();
+    for (Element& e : m_elements) {
+        const int* const v = verticesOf(e);
+        e.slots = static_cast<int>(m_slots.size());
+        for (int j = 0; j < columnsOf(e); ++j)
+            for (int i = j + 1; i < e.vertexCount; ++i) m_slots.push_back(pairSlot(matrix, v[i], v[j]));
     }
 }
 
 PatchEnergy::Vectors PatchEnergy::derivatives(const Element& e, const Points& x) const {
+    const int* const v = verticesOf(e);
     if (e.mirrored >= 0) {
         const Mirrored& m = m_mirrored[e.mirrored];
         Eigen::Matrix<double, 9, 1> sum = m.offset;
-        for (std::size_t i = 0; i < e.vertices.size(); ++i) sum += m.rows.middleCols<3>(3 * i) * x.col(e.vertices[i]);
+        for (int i = 0; i < e.vertexCount; ++i) sum += m.rows.middleCols<3>(3 * i) * x.col(v[i]);
         return Eigen::Map<const Vectors>(sum.data());
     }
-    const Vec3 origin = x.col(e.vertices[0]);  // loses no digits far from the origin
+    const Vec3* const rows = rowsOf(e);
+    const Vec3 origin = x.col(v[0]);  // loses no digits far from the origin
     Vectors sum = Vectors::Zero();
-    for (std::size_t i = 1; i < e.vertices.size(); ++i)
-        sum += (x.col(e.vertices[i]) - origin) * e.rows.col(i).transpose();
+    for (int i = 1; i < e.vertexCount; ++i) sum += (x.col(v[i]) - origin) * rows[i].transpose();
     return sum;
 }
 
-PatchEnergy::Vectors PatchEnergy::residual(const Element& e, const Points& x, const Vec3& normal) const {
-    return derivatives(e, x) - normal * e.curvature.transpose();
+PatchEnergy::Vectors PatchEnergy::residual(const Element& e, const Points& x) const {
+    Vectors result = derivatives(e, x);
+    if (e.isCurved()) result -= normalOf(verticesOf(e), x).n * e.curvature.transpose();
+    return result;
 }
 
-double PatchEnergy::valueOf(int triangle, const Points& x) const {
-    const Element& e = m_elements[triangle];
-    const Vectors r = residual(e, x, normalOf(e.vertices, x).n);
-    return 0.5 * r.cwiseProduct(r * plateMatrix(triangle)).sum();
+double PatchEnergy::valueOf(const Element& e, const Points& x) const {
+    const Vectors r = residual(e, x);
+    return 0.5 * r.cwiseProduct(r * e.plateMatrix()).sum();
 }
 
 double PatchEnergy::value(const Points& x) const {
-    double sum = 0.0;
-    for (std::size_t t = 0; t < m_elements.size(); ++t) sum += valueOf(static_cast<int>(t), x);
+    double sum = m_flatRest.cols() > 0 ? flatValue(x) : 0.0;
+    for (const Element& e : m_elements) sum += valueOf(e, x);
     return sum;
 }
 
-void PatchEnergy::addElementGradient(int triangle, const Points& x, Points& gradient) const {
-    const Element& e = m_elements[triangle];
-    const Normal normal = normalOf(e.vertices, x);
-    const Vectors moments = residual(e, x, normal.n) * plateMatrix(triangle);
-    if (e.mirrored >= 0) {
-        const auto& rows = m_mirrored[e.mirrored].rows;
-        const Eigen::Map<const Eigen::Matrix<double, 9, 1>> flat(moments.data());
-        for (std::size_t i = 0; i < e.vertices.size(); ++i)
-            gradient.col(e.vertices[i]) += rows.middleCols<3>(3 * i).transpose() * flat;
-    } else {
-        for (std::size_t i = 0; i < e.vertices.size(); ++i) gradient.col(e.vertices[i]) += moments * e.rows.col(i);
+/// 1/2 u . K u of what is left of the positions without the affine map of the rest positions nearest to them, which
+/// stores nothing: of sheets that are nearly flat no digits are lost either.
+double PatchEnergy::flatValue(const Points& x) const {
+    const Vec3 first = x.col(0);
+    Vec3 mean = Vec3::Zero();
+    Mat3 moments = Mat3::Zero();
+    for (int i = 0; i < x.cols(); ++i) {
+        mean += x.col(i) - first;
+        moments += (x.col(i) - first) * m_flatRest.col(i).transpose();  // the rest positions' sum is zero
     }
+    mean = first + mean / static_cast<double>(x.cols());
+    const Mat3 map = moments * m_inverseMoments;
+    for (int i = 0; i < x.cols(); ++i) m_padded.col(i).head<3>() = x.col(i) - mean - map * m_flatRest.col(i);
+    return 0.5 * constantProduct({m_constant.outerIndexPtr(), m_constant.innerIndexPtr(), m_constant.valuePtr(),
+                                  m_padded.data(), static_cast<int>(x.cols())});
+}
+
+/// Of a mirrored patch, whose share the constant Hessian does not have.
+void PatchEnergy::addElementGradient(const Element& e, const Points& x, const auto& add) const {
+    const int* const v = verticesOf(e);
+    const TriangleNormal normal = normalOf(v, x);
+    const Vectors moments = residual(e, x) * e.plateMatrix();
+    const auto& rows = m_mirrored[e.mirrored].rows;
+    const Eigen::Map<const Eigen::Matrix<double, 9, 1>> flat(moments.data());
+    for (int i = 0; i < e.vertexCount; ++i) add(v[i], Vec3(rows.middleCols<3>(3 * i).transpose() * flat));
     const Vec3 pull = moments * e.curvature;  // d(-b n) . moments
-    for (int j = 0; j < 3; ++j) gradient.col(e.vertices[j]) += normal.slopes.col(j).dot(pull) * normal.n;
+    for (int j = 0; j < 3; ++j) add(v[j], Vec3(normal.slopes.col(j).dot(pull) * normal.n));
+}
+
+void PatchEnergy::pad(const Points& x) const {
+    for (int i = 0; i < x.cols(); ++i) m_padded.col(i).head<3>() = x.col(i);
 }
 
 void PatchEnergy::addGradient(const Points& x, Points& gradient) const {
-    for (std::size_t t = 0; t < m_elements.size(); ++t) addElementGradient(static_cast<int>(t), x, gradient);
+    pad(x);
+    addConstantGradient({m_constant.outerIndexPtr(), m_constant.innerIndexPtr(), m_constant.valuePtr(), m_padded.data(),
+                         static_cast<int>(x.cols())},
+                        1.0, gradient.data());
+    const auto add = [&](int vertex, const Vec3& g) { gradient.col(vertex) += g; };
+    for (const Element& e : m_elements) {
+        if (e.mirrored >= 0)
+            addElementGradient(e, x, add);
+        else if (e.isCurved())
+            addNormalGradient(e, normalOf(verticesOf(e), x), x, add);
+    }
 }
 
 void PatchEnergy::addTo(StepSystem& system, const Points& x, HessianKind kind) const {
-    Points gradient = Points::Zero(3, x.cols());
-    const Points centred = x.colwise() - x.col(0);
-    gradient.transpose() = m_constant * centred.transpose();
-    for (std::size_t t = 0; t < m_elements.size(); ++t) {
-        const int triangle = static_cast<int>(t);
-        if (m_elements[t].mirrored >= 0) addMirrored(triangle, system, x, gradient);
-        if (!m_elements[t].curvature.isZero(0.0)) addNormalTerms(triangle, system, x, kind, gradient);
+    pad(x);
+    const TermSink sink = system.sink();
+    addConstantGradient({m_constant.outerIndexPtr(), m_constant.innerIndexPtr(), m_constant.valuePtr(), m_padded.data(),
+                         static_cast<int>(x.cols())},
+                        sink.gradientFactor, sink.rhs);
+    for (const Element& e : m_elements) {
+        if (e.mirrored >= 0) addMirrored(e, system, x);
+        if (e.isCurved()) addNormalTerms(e, system, x, kind);
     }
-    system.addGradient(gradient);
 }
 
 /// A mirrored patch's whole gradient, and its constant Hessian, which is no scalar.
-void PatchEnergy::addMirrored(int triangle, StepSystem& system, const Points& x, Points& gradient) const {
-    const Element& e = m_elements[triangle];
-    addElementGradient(triangle, x, gradient);
-    const auto& hessian = m_mirrored[e.mirrored].hessian;
-    const int* slot = m_slots[triangle].data();
-    for (std::size_t j = 0; j < e.vertices.size(); ++j) {
-        system.addDiagonal(e.vertices[j], hessian.block<3, 3>(3 * j, 3 * j));
-        for (std::size_t i = j + 1; i < e.vertices.size(); ++i)
-            system.addPair(*slot++, hessian.block<3, 3>(3 * i, 3 * j));
+void PatchEnergy::addMirrored(const Element& e, StepSystem& system, const Points& x) const {
+    addElementGradient(e, x, [&](int vertex, const Vec3& g) { system.addGradient(vertex, g); });
+    const Mat3* block = m_mirrored[e.mirrored].hessian.data();
+    const int* slot = m_slots.data() + e.slots;
+    for (int j = 0; j < e.vertexCount; ++j) {
+        system.addDiagonal(verticesOf(e)[j], *block++);
+        for (int i = j + 1; i < e.vertexCount; ++i) system.addPair(*slot++, *block++);
     }
 }
 
-/// The energy's term -p(x) . n(x), p = sum_i w_i x_i, w = D A B^T C b: its gradient (a mirrored patch has that
-/// already), and its second derivatives. With s_j the slopes:
+/// The energy's term -p(x) . n(x), p = sum_i w_i x_i, w = D A B^T C b: its gradient.
+void PatchEnergy::addNormalGradient(const Element& e, const TriangleNormal& normal, const Points& x,
+                                    const auto& add) const {
+    const int* const v = verticesOf(e);
+    const Vec3 weighted = e.plateMatrix() * e.curvature;
+    const Vec3 p = derivatives(e, x) * weighted;
+    for (int i = 0; i < e.vertexCount; ++i) add(v[i], Vec3(-weighted.dot(rowsOf(e)[i]) * normal.n));
+    for (int j = 0; j < 3; ++j) add(v[j], Vec3(normal.slopes.col(j).dot(p) * normal.n));
+}
+
+/// That gradient (a mirrored patch has it already), and its second derivatives. With s_j the slopes:
 ///   x_i x_j:  w_i s_j n^T;   x_j x_k:  -(s_j . p) s_k n^T - (s_k . p) n s_j^T + (n . p) (s_j . s_k) n n^T
 /// Gauss-Newton keeps of the latter the last term, with its value at rest, b C b, for n . p.
-void PatchEnergy::addNormalTerms(int triangle, StepSystem& system, const Points& x, HessianKind kind,
-                                 Points& gradient) const {
-    const Element& e = m_elements[triangle];
-    const Normal normal = normalOf(e.vertices, x);
+void PatchEnergy::addNormalTerms(const Element& e, StepSystem& system, const Points& x, HessianKind kind) const {
+    const int* const v = verticesOf(e);
+    const TriangleNormal normal = normalOf(v, x);
     const Vec3& n = normal.n;
-    const Vec3 weighted = plateMatrix(triangle) * e.curvature;
-    const bool mirrored = e.mirrored >= 0;
-    const Vec3 p = derivatives(e, x) * weighted;
-    const double stiff = kind == HessianKind::Exact ? n.dot(p) : e.curvature.dot(weighted);
+    const Vec3 weighted = e.plateMatrix() * e.curvature;
+    const bool mirrored = e.mirrored >= 0, exact = kind == HessianKind::Exact;
+    if (!mirrored) addNormalGradient(e, normal, x, [&](int vertex, const Vec3& g) { system.addGradient(vertex, g); });
+    const Vec3 p = exact ? Vec3(derivatives(e, x) * weighted) : Vec3::Zero();
+    const double stiff = exact ? n.dot(p) : e.curvature.dot(weighted);
     const auto ofCorners = [&](int j, int k) {
         const Vec3 sj = normal.slopes.col(j), sk = normal.slopes.col(k);
         Mat3 m = stiff * sj.dot(sk) * n * n.transpose();
-        if (kind == HessianKind::Exact) m -= sj.dot(p) * sk * n.transpose() + sk.dot(p) * n * sj.transpose();
+        if (exact) m -= sj.dot(p) * sk * n.transpose() + sk.dot(p) * n * sj.transpose();
         return m;
     };
-    const auto ofVertex = [&](std::size_t i, int j) -> Mat3 {  // derivative of the force on i by corner j
+    const auto ofVertex = [&](int i, int j) -> Mat3 {  // derivative of the force on i by corner j
         const Vec3 slope = normal.slopes.col(j);
-        if (!mirrored) return weighted.dot(e.rows.col(i)) * slope * n.transpose();
+        if (!mirrored) return weighted.dot(rowsOf(e)[i]) * slope * n.transpose();
         Mat3 w = Mat3::Zero();
         for (int ab = 0; ab < 3; ++ab)
             w += weighted[ab] * m_mirrored[e.mirrored].rows.block<3, 3>(3 * ab, 3 * i).transpose();
         return w * slope * n.transpose();
     };
-    if (!mirrored) {
-        for (std::size_t i = 0; i < e.vertices.size(); ++i)
-            gradient.col(e.vertices[i]) -= weighted.dot(e.rows.col(i)) * n;
-        for (int j = 0; j < 3; ++j) gradient.col(e.vertices[j]) += normal.slopes.col(j).dot(p) * n;
-    }
-    std::size_t slot = 0;
+    const int* slot = m_slots.data() + e.slots;
     for (int j = 0; j < 3; ++j) {  // the pairs of the corners come first
-        for (std::size_t i = j; i < e.vertices.size(); ++i) {
+        for (int i = j; i < e.vertexCount; ++i) {
             Mat3 block = ofVertex(i, j);
             if (i < 3) {
-                block += ofVertex(j, static_cast<int>(i)).transpose();
-                block += ofCorners(static_cast<int>(i), j);
+                block += ofVertex(j, i).transpose();
+                block += ofCorners(i, j);
             }
-            if (static_cast<int>(i) == j)
-                system.addDiagonal(e.vertices[j], block);
+            if (i == j)
+                system.addDiagonal(v[j], block);
             else
-                system.addPair(m_slots[triangle][slot++], block);
+                system.addPair(*slot++, block);
         }
     }
 }
 
 Vec3 PatchEnergy::bendingStrain(int triangle, const Points& x) const {
-    const Element& e = m_elements[triangle];
-    const Vec3 n = normalOf(e.vertices, x).n;
-    return derivatives(e, x).transpose() * n - e.curvature;
+    const Element& e = elementOf(triangle);
+    return derivatives(e, x).transpose() * normalOf(verticesOf(e), x).n - e.curvature;
 }
 
 PlasticFlow PatchEnergy::flow(const Points& x) {
     PlasticFlow result;
-    for (std::size_t t = 0; t < m_elements.size(); ++t) {
-        const Plate& plate = m_plates[t];
-        if (!std::isfinite(plate.yieldCurvature)) continue;
-        Element& e = m_elements[t];
-        const Vec3 strain = bendingStrain(static_cast<int>(t), x);
-        const double size = norm(strain), limit = plate.yieldCurvature + plate.hardening * e.accumulated;
+    for (Element& e : m_elements) {
+        if (!e.canYield()) continue;
+        const Vec3 strain = bendingStrain(e.triangle, x);
+        const double size = norm(strain), limit = e.plate.yieldCurvature + e.plate.hardening * e.accumulated;
         if (!(size > limit * (1.0 + kYieldRounding))) continue;
-        const double before = valueOf(static_cast<int>(t), x);
-        const double slip = (size - limit) / (1.0 + plate.hardening);
+        const double before = valueOf(e, x);
+        const double slip = (size - limit) / (1.0 + e.plate.hardening);
         e.accumulated += slip;
         e.curvature += slip / size * strain;
-        result.add(before - valueOf(static_cast<int>(t), x), static_cast<int>(t));
+        result.add(before - valueOf(e, x), e.triangle);
     }
     return result;
 }

@@ -4,6 +4,7 @@
 #include <type_traits>
 
 #include "energy/Energy.h"
+#include "energy/TriangleKernel.h"
 
 namespace jacket {
 
@@ -54,6 +55,11 @@ class StencilEnergy final : public Energy {
     void addTo(StepSystem& system, const Points& x, HessianKind kind) const override {
         for (std::size_t g = 0; g < m_groups.size(); ++g) {
             const Group& group = m_groups[g];
+            if constexpr (TriangleTermModel<Model>)
+                if (kind == HessianKind::Positive) {
+                    addTriangles<Model>(triangles(g), x.data(), system.sink());
+                    continue;
+                }
             for (std::size_t i = 0; i < group.stencils.size(); ++i) {
                 const Stencil<N> xs = gather(x, group.stencils[i]);
                 StencilEval<N> term = group.model.evaluate(xs, m_rest[g][i], kind);
@@ -77,7 +83,10 @@ class StencilEnergy final : public Energy {
     double value(const Points& x) const override {
         double sum = 0.0;
         for (std::size_t g = 0; g < m_groups.size(); ++g)
-            for (std::size_t i = 0; i < m_groups[g].stencils.size(); ++i) sum += valueOf(g, i, x);
+            if constexpr (TriangleTermModel<Model>)
+                sum += energyOfTriangles<Model>(triangles(g), x.data());
+            else
+                for (std::size_t i = 0; i < m_groups[g].stencils.size(); ++i) sum += valueOf(g, i, x);
         return sum;
     }
 
@@ -114,6 +123,11 @@ class StencilEnergy final : public Energy {
     }
 
   private:
+    TriangleList<typename Model::Rest> triangles(std::size_t g) const requires TriangleTermModel<Model> {
+        return {m_groups[g].stencils.data(), m_slots[g].data(), m_rest[g].data(),
+                static_cast<int>(m_groups[g].stencils.size())};
+    }
+
     static Stencil<N> gather(const Points& x, const Vertices& vertices) {
         Stencil<N> xs;
         for (int a = 0; a < N; ++a) xs.col(a) = x.col(vertices[a]);

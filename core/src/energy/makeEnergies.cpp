@@ -92,13 +92,14 @@ std::unique_ptr<Energy> makeEnergy(const Model& model, const HalfEdgeMesh& mesh,
 std::unique_ptr<Energy> makeEnergy(const PatchBending& model, const HalfEdgeMesh& mesh, const RestShape& rest,
                                    const Materials& materials) {
     std::vector<PatchEnergy::Plate> plates;
+    plates.reserve(mesh.triangleCount());
     for (int t = 0; t < mesh.triangleCount(); ++t) {
         const ShellMaterial& material = materials.at(t);
         const PatchBending fitted = model.fittedTo(material);
         const YieldRule yield = yieldRule(material);
         plates.push_back({*fitted.stiffness, *fitted.poisson, yield.curvature, yield.hardening});
     }
-    return std::make_unique<PatchEnergy>(mesh, rest, std::move(plates));
+    return std::make_unique<PatchEnergy>(mesh, rest, plates);
 }
 
 }  // namespace

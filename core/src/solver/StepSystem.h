@@ -7,6 +7,20 @@
 
 namespace jacket {
 
+/// A Hessian that never changes and is a scalar per vertex pair, sorted by where its scalars go.
+struct ConstantPart {
+    std::vector<double> lower;  ///< of every block that the matrix' pattern has below the diagonal [N/m]
+    Eigen::VectorXd diagonal;   ///< [N/m]
+    ConstantHessian beside;     ///< all others
+};
+
+/// Where loops over many terms write: the right side by 3 numbers a vertex, blocks by 9, each with the factor that
+/// takes a term's gradient and Hessian there.
+struct TermSink {
+    double *rhs, *diagonal, *lower;
+    double gradientFactor, hessianFactor;
+};
+
 /// A and b of one shell's step, A v = b for the velocities v at its end (Baraff & Witkin 1998, eq. 16, with v = v_n +
 /// dv):
 ///
@@ -20,12 +34,19 @@ class StepSystem {
     BlockMatrix matrix;
     Points rhs;
 
-    void begin(double h, double stiffnessDamping) {
+    /// `constant` must outlive the system.
+    void begin(double h, double stiffnessDamping, const ConstantPart* constant = nullptr) {
         m_h = h;
         m_stiffnessFactor = h * h + h * stiffnessDamping;
-        matrix.setZero();
-        matrix.setBeside(nullptr, 0.0);
         rhs.setZero(3, matrix.size());
+        if (!constant) {
+            matrix.setZero();
+            matrix.setBeside(nullptr, 0.0);
+            return;
+        }
+        fill(matrix.lower(), constant->lower.data());
+        fill(matrix.diagonal(), constant->diagonal.data());
+        matrix.setBeside(&constant->beside, m_stiffnessFactor);
     }
 
     /// One term of an energy. `slots`: see StencilSlots.
@@ -36,9 +57,14 @@ class StepSystem {
         addMatrix<N>(vertices, slots, term.hessian, m_stiffnessFactor);
     }
 
-    /// The same piece by piece: dE/dx of all vertices; a block of the Hessian on the diagonal, or off it (see
-    /// pairSlot).
-    void addGradient(const Points& gradient) { rhs -= m_h * gradient; }
+    /// For terms that are written by the thousand.
+    TermSink sink() {
+        return {rhs.data(), matrix.diagonal().data()->data(),
+                matrix.lower().empty() ? nullptr : matrix.lower().data()->data(), -m_h, m_stiffnessFactor};
+    }
+
+    /// The same piece by piece: dE/dx of one vertex; a block of the Hessian on the diagonal, or off it (see pairSlot).
+    void addGradient(int vertex, const Vec3& gradient) { rhs.col(vertex) -= m_h * gradient; }
     void addDiagonal(int vertex, const Mat3& block) { matrix.diagonal()[vertex] += m_stiffnessFactor * block; }
     void addPair(int slot, const Mat3& block) {
         if (slot >= 0)
@@ -46,16 +72,6 @@ class StepSystem {
         else
             matrix.lower()[~slot] += m_stiffnessFactor * block.transpose();
     }
-    /// A Hessian of scalars: `near` has those in the matrix' pattern, slot and value, `diagonal` those on the diagonal;
-    /// `beside` all others, which must outlive the system.
-    void addConstant(const std::vector<std::pair<int, double>>& near, const Eigen::VectorXd& diagonal,
-                     const ConstantHessian& beside) {
-        for (const auto& [slot, value] : near) matrix.lower()[slot].diagonal().array() += m_stiffnessFactor * value;
-        for (int i = 0; i < matrix.size(); ++i)
-            matrix.diagonal()[i].diagonal().array() += m_stiffnessFactor * diagonal[i];
-        matrix.setBeside(&beside, m_stiffnessFactor);
-    }
-
     /// A linear damping force -D v; its h D v_n on the right cancels the force itself.
     template <int N>
     void addDamping(const std::array<int, N>& vertices, const std::array<int, N*(N - 1) / 2>& slots,
@@ -63,11 +79,11 @@ class StepSystem {
         addMatrix<N>(vertices, slots, damping, m_h);
     }
 
-    /// The alteration's force -K y. Only after every energy and before anything else has been added.
-    void addAlteration(const Points& y) {
+    /// The force -K (scale y) of an alteration. Only after every energy and before anything else has been added.
+    void addAlteration(const Eigen::Ref<const Points>& y, double scale = 1.0) {
         m_scratch.resize(3, matrix.size());
         matrix.multiply(y.data(), m_scratch.data());  // (h^2 + h beta) K y
-        rhs -= (m_h / m_stiffnessFactor) * m_scratch;
+        rhs -= (scale * m_h / m_stiffnessFactor) * m_scratch;
     }
 
     /// A force on one vertex [N].
@@ -83,7 +99,7 @@ class StepSystem {
         for (const int s : slots) matrix.lower()[s >= 0 ? s : ~s] += m_h * drag;  // symmetric
     }
 
-    void addMass(const Eigen::VectorXd& mass, const Points& v, double massDamping) {
+    void addMass(const Eigen::VectorXd& mass, const Eigen::Ref<const Points>& v, double massDamping) {
         for (int i = 0; i < matrix.size(); ++i) {
             matrix.diagonal()[i].diagonal().array() += mass[i] * (1.0 + m_h * massDamping);
             rhs.col(i) += mass[i] * v.col(i);
@@ -91,6 +107,13 @@ class StepSystem {
     }
 
   private:
+    void fill(std::vector<Mat3>& blocks, const double* scalars) const {
+        for (std::size_t i = 0; i < blocks.size(); ++i) {
+            blocks[i].setZero();
+            blocks[i].diagonal().setConstant(m_stiffnessFactor * scalars[i]);
+        }
+    }
+
     template <int N>
     void addMatrix(const std::array<int, N>& vertices, const std::array<int, N*(N - 1) / 2>& slots,
                    const Eigen::Matrix<double, 3 * N, 3 * N>& term, double factor) {

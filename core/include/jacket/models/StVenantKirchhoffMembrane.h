@@ -6,6 +6,7 @@
 
 #include "jacket/models/StencilModel.h"
 #include "jacket/models/StencilTools.h"
+#include "jacket/models/TriangleTerm.h"
 
 namespace jacket {
 
@@ -85,52 +86,52 @@ struct StVenantKirchhoffMembrane {
                 .weft = weight * *weftStiffness - coupling - shear};
     }
 
+    /// The formula. With F_1, F_2 the columns of F and a_i = F g_i, the derivative of F S g_i by x_j is
+    ///     (g_i . S g_j) I + shear / 2 ((g_i . g_j) F F^T + a_j a_i^T) + dilation a_i a_j^T
+    ///     + warp g_i1 g_j1 F_1 F_1^T + weft g_i2 g_j2 F_2 F_2^T
+    /// of which the coefficients of F_1 F_1^T, F_1 F_2^T, F_2 F_1^T and F_2 F_2^T are collected.
+    JACKET_FORMULA static TriangleTerm term(const Triple& a, const Triple& b, const Rest& r, HessianKind kind) {
+        const double g11 = r.inverseFrame(0, 0), g12 = r.inverseFrame(0, 1);
+        const double g21 = r.inverseFrame(1, 0), g22 = r.inverseFrame(1, 1);
+        const Triple F1 = g11 * a + g21 * b, F2 = g12 * a + g22 * b;
+        const double e11 = 0.5 * (dot(F1, F1) - 1.0), e22 = 0.5 * (dot(F2, F2) - 1.0), e12 = 0.5 * dot(F1, F2);
+        const double spread = r.dilation * (e11 + e22);
+        const PlaneStress S{(r.shear + r.warp) * e11 + spread, (r.shear + r.weft) * e22 + spread, r.shear * e12};
+        const PlaneStress G = kind == HessianKind::Exact ? S : positivePart(S);
+        const Triple P1 = S.s11 * F1 + S.s12 * F2, P2 = S.s12 * F1 + S.s22 * F2;
+
+        const double half = 0.5 * r.shear, along1 = half + r.dilation + r.warp, along2 = half + r.dilation + r.weft;
+        const auto block = [&](double gi1, double gi2, double gj1, double gj2) __attribute__((always_inline)) {
+            const double both = half * (gi1 * gj1 + gi2 * gj2);
+            const double k11 = both + along1 * (gi1 * gj1), k22 = both + along2 * (gi2 * gj2);
+            const double k12 = half * (gj1 * gi2) + r.dilation * (gi1 * gj2);
+            const double k21 = half * (gj2 * gi1) + r.dilation * (gi2 * gj1);
+            const double geometric = gi1 * (G.s11 * gj1 + G.s12 * gj2) + gi2 * (G.s12 * gj1 + G.s22 * gj2);
+            return outerSum(F1, k11 * F1 + k12 * F2, F2, k21 * F1 + k22 * F2, geometric);
+        };
+        return {.energy = 0.5 * (S.s11 * e11 + S.s22 * e22) + S.s12 * e12,
+                .gradient1 = g11 * P1 + g12 * P2,
+                .gradient2 = g21 * P1 + g22 * P2,
+                .block11 = block(g11, g12, g11, g12),
+                .block22 = block(g21, g22, g21, g22),
+                .block12 = block(g11, g12, g21, g22)};
+    }
+
     template <class = void>
     StencilEval<3> evaluate(const Stencil<3>& x, const Rest& r, HessianKind kind) const {
-        const Eigen::RowVector2d g1 = r.inverseFrame.row(0), g2 = r.inverseFrame.row(1);
-        const Vec3 a = x.col(1) - x.col(0), b = x.col(2) - x.col(0);
-        const Eigen::Matrix<double, 3, 2> F = a * g1 + b * g2;
-        const Mat2 e = 0.5 * (F.transpose() * F - Mat2::Identity());
-        const Mat2 S = stressOf(e, r);
-
+        const TriangleTerm t = term(triple(x.col(1) - x.col(0)), triple(x.col(2) - x.col(0)), r, kind);
         StencilEval<3> result;
-        result.energy = 0.5 * S.cwiseProduct(e).sum();
-        const Eigen::Matrix<double, 3, 2> P = F * S;
-        result.gradient.col(1) = P * g1.transpose();
-        result.gradient.col(2) = P * g2.transpose();
+        result.energy = t.energy;
+        result.gradient.col(1) = vec3(t.gradient1);
+        result.gradient.col(2) = vec3(t.gradient2);
         result.gradient.col(0) = -result.gradient.col(1) - result.gradient.col(2);
-
-        // the derivative of F S g_i by x_j, with a_i = F g_i:
-        // (g_i . S g_j) I + shear / 2 ((g_i . g_j) F F^T + a_j a_i^T) + dilation a_i a_j^T
-        // + warp g_i1 g_j1 F_1 F_1^T + weft g_i2 g_j2 F_2 F_2^T, of the columns of F
-        const Mat2 geometric = kind == HessianKind::Exact ? S : positivePart(S);
-        const Mat3 FFt = (0.5 * r.shear) * (F * F.transpose());
-        const Vec3 a1 = F * g1.transpose(), a2 = F * g2.transpose();
-        const auto block = [&](const Eigen::RowVector2d& gi, const Eigen::RowVector2d& gj, const Vec3& ai,
-                               const Vec3& aj) {
-            const Vec3 shearAi = (0.5 * r.shear) * ai, dilationAi = r.dilation * ai;
-            Mat3 m = gi.dot(gj) * FFt + aj * shearAi.transpose() + dilationAi * aj.transpose();
-            m.diagonal().array() += gi.dot(gj * geometric);  // S is symmetric
-            return m;
-        };
-        Mat3 m11 = block(g1, g1, a1, a1), m12 = block(g1, g2, a1, a2), m22 = block(g2, g2, a2, a2);
-        if (weftStiffness) {
-            const Mat3 alongWarp = r.warp * F.col(0) * F.col(0).transpose();
-            const Mat3 alongWeft = r.weft * F.col(1) * F.col(1).transpose();
-            m11 += g1(0) * g1(0) * alongWarp + g1(1) * g1(1) * alongWeft;
-            m12 += g1(0) * g2(0) * alongWarp + g1(1) * g2(1) * alongWeft;
-            m22 += g2(0) * g2(0) * alongWarp + g2(1) * g2(1) * alongWeft;
-        }
-        setTriangleMatrix(result.hessian, m11, m12, m22);
+        setTriangleMatrix(result.hessian, mat3(t.block11), mat3(t.block12), mat3(t.block22));
         return result;
     }
 
     template <class = void>
     double energy(const Stencil<3>& x, const Rest& r) const {
-        const Eigen::Matrix<double, 3, 2> F =
-            (x.col(1) - x.col(0)) * r.inverseFrame.row(0) + (x.col(2) - x.col(0)) * r.inverseFrame.row(1);
-        const Mat2 e = 0.5 * (F.transpose() * F - Mat2::Identity());
-        return 0.5 * stressOf(e, r).cwiseProduct(e).sum();
+        return term(triple(x.col(1) - x.col(0)), triple(x.col(2) - x.col(0)), r, HessianKind::Exact).energy;
     }
 
     /// Area times thickness times stress S that the strain's first-order change along dx leads to from x [N m].
@@ -214,16 +215,22 @@ struct StVenantKirchhoffMembrane {
                          length);
     }
 
-    /// Nearest positive semi-definite matrix to a symmetric S, in closed form.
-    template <class = void>
-    static Mat2 positivePart(const Mat2& S) {
-        const double mean = 0.5 * (S(0, 0) + S(1, 1));
-        const double radius = std::hypot(0.5 * (S(0, 0) - S(1, 1)), S(0, 1));
-        if (mean - radius >= 0.0) return S;
-        if (mean + radius <= 0.0) return Mat2::Zero();
-        return (mean + radius) / (2.0 * radius) * (S - (mean - radius) * Mat2::Identity());
+    struct PlaneStress {
+        double s11, s22, s12;
+    };
+
+    /// Nearest positive semi-definite matrix to a symmetric S, in closed form: f (S - l I), where the smaller
+    /// eigenvalue l is negative.
+    JACKET_FORMULA static PlaneStress positivePart(const PlaneStress& S) {
+        constexpr double kTiny = 1e-300;  // keeps 0 / 0 out where nothing has to be cut off
+        const double mean = 0.5 * (S.s11 + S.s22), difference = 0.5 * (S.s11 - S.s22);
+        const double radius = std::sqrt(difference * difference + S.s12 * S.s12);
+        const double smaller = mean - radius, larger = mean + radius, share = larger / (2.0 * radius + kTiny);
+        const double partial = larger > 0.0 ? share : 0.0;
+        const double factor = smaller >= 0.0 ? 1.0 : partial, cut = smaller >= 0.0 ? 0.0 : smaller;
+        return {factor * (S.s11 - cut), factor * (S.s22 - cut), factor * S.s12};
     }
 };
-static_assert(StencilModel<StVenantKirchhoffMembrane> && PlasticStencilModel<StVenantKirchhoffMembrane>);
+static_assert(TriangleTermModel<StVenantKirchhoffMembrane> && PlasticStencilModel<StVenantKirchhoffMembrane>);
 
 }  // namespace jacket
