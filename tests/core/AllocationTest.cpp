@@ -1,0 +1,104 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "EdgeStretch.h"
+#include "ShellAssembly.h"
+#include "jacket/Shell.h"
+
+namespace {
+std::atomic<long> allocations{0};
+void* counted(std::size_t size) {
+    ++allocations;
+    if (void* memory = std::malloc(size)) return memory;
+    throw std::bad_alloc();
+}
+}  // namespace
+
+// Eigen allocates with malloc, which glibc lets us stand before.
+extern "C" void* __libc_malloc(std::size_t size);
+extern "C" void* malloc(std::size_t size) {
+    ++allocations;
+    return __libc_malloc(size);
+}
+void* operator new(std::size_t size) {
+    return counted(size);
+}
+void* operator new[](std::size_t size) {
+    return counted(size);
+}
+void operator delete(void* memory) noexcept {
+    std::free(memory);
+}
+void operator delete[](void* memory) noexcept {
+    std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+    std::free(memory);
+}
+void operator delete[](void* memory, std::size_t) noexcept {
+    std::free(memory);
+}
+
+namespace jacket {
+namespace {
+
+constexpr double kStep = 1.0 / 60;
+const Vec3 kGravity{0, -9.81, 0};
+
+TriangleMesh sheetOrBowl(bool curved) {
+    TriangleMesh mesh = makeGrid({.size = {1, 1}, .cells = {30, 30}});
+    if (curved)
+        for (int i = 0; i < mesh.positions.cols(); ++i)
+            mesh.positions(1, i) =
+                0.3 * (mesh.positions(0, i) * mesh.positions(0, i) + mesh.positions(2, i) * mesh.positions(2, i));
+    return mesh;
+}
+
+class AllocationOf : public testing::TestWithParam<std::pair<bool, bool>> {};  // curved, plastic
+INSTANTIATE_TEST_SUITE_P(Shells, AllocationOf,
+                         testing::Values(std::pair{false, false}, std::pair{true, false}, std::pair{false, true},
+                                         std::pair{true, true}),
+                         [](const auto& parameter) {
+                             return std::string(parameter.param.first ? "Curved" : "Flat") +
+                                    (parameter.param.second ? "Plastic" : "Elastic");
+                         });
+
+TEST_P(AllocationOf, AssemblyEnergyAndFlowAreFreeOfItAfterTheFirstStep) {
+    const auto [curved, plastic] = GetParam();
+    ShellMaterial material{.young = 2e9, .poisson = 0.3, .thickness = 1e-3, .density = 1000.0};
+    if (plastic) material.yieldStress = 1e4;
+    Shell shell(sheetOrBowl(curved), material, {.plasticity = plastic});
+    for (int i = 0; i < 31; ++i) shell.pin(i);
+    for (int k = 0; k < 4; ++k) shell.step(kStep, kGravity);
+
+    ShellDesign design;
+    design.materials.list = {material};
+    ShellAssembly assembly(shell, design);
+    const Points y = Points::Constant(3, shell.vertexCount(), 1e-5);
+    const Eigen::Ref<const Points> ahead = shell.velocities();
+    const auto once = [&] {
+        assembly.assemble(shell, kStep, kGravity, nullptr, shell.velocities(), y);
+        assembly.assemble(shell, kStep, kGravity, nullptr, shell.velocities(), y, &ahead);
+        assembly.flow(shell.positions());
+        const double energy = shell.elasticEnergy(shell.positions());
+        shell.advance(kStep);
+        return energy;
+    };
+    once();
+    const long before = allocations;
+    EXPECT_TRUE(std::isfinite(once()));
+    EXPECT_EQ(allocations - before, 0);
+}
+
+TEST(Allocation, IsCounted) {
+    const long before = allocations;
+    const Points some = Points::Zero(3, 100);
+    EXPECT_GT(allocations, before);
+    EXPECT_EQ(some.norm(), 0.0);
+}
+
+}  // namespace
+}  // namespace jacket
