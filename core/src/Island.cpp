@@ -22,6 +22,22 @@ constexpr double kMostGainOfFast = 0.1;    ///< the same where a body goes farth
 constexpr double kMostOvertaking = 3.0;    ///< of a shell that is pushed: its speed over the pushing body's
 constexpr double kMostEnergyGain = 1.0;    ///< of a step that is accepted as it is
 
+/// Gives the time since the last call, by the caller's clock if there is one.
+class LapTimer {
+  public:
+    explicit LapTimer(const IslandInput& input) : m_clock(input.clock), m_last(m_clock ? m_clock() : 0.0) {}
+    void addTo(double& sum) {
+        if (!m_clock) return;
+        const double now = m_clock();
+        sum += now - m_last;
+        m_last = now;
+    }
+
+  private:
+    double (*m_clock)();
+    double m_last;
+};
+
 /// From a body's centre of mass to where the shell touches it, at the start of the step.
 Vec3 contactArm(const IslandInput& input, const Contact& contact) {
     Vec3 arm = -input.bodies[contact.body].position;
@@ -48,9 +64,10 @@ struct IslandSolver::Impl {
     Points unfiltered;               ///< (b - A v) at the solution, soft rows included
     CoupledVector u, reference;
     Eigen::Matrix<double, 6, Eigen::Dynamic> freeTwist;
-    int lastRounds = 1;         ///< changes of the contacts in the last step, and one
+    int lastRounds = 1;                          ///< changes of the contacts in the last step, and one
     mutable Points at;                           ///< where velocities lead one shell
     mutable std::vector<double> elasticAtStart;  ///< of each shell at the start of the step; NaN: not yet asked for [J]
+    StepTimes times;                             ///< of the step so far
     double impulseShare = 1.0;  ///< of the solved contacts that a step cut short takes: see limitDeformation
 
     void gather(const IslandInput& input);
@@ -86,14 +103,20 @@ StepReport IslandSolver::solve(const IslandInput& input) {
     Impl& s = *m_impl;
     StepReport report;
     s.impulseShare = 1.0;
-    s.gather(input);                                                                  // one numbering for all shells
+    s.times = {};
+    s.gather(input);  // one numbering for all shells
+    LapTimer lap(input);
     s.response.begin(input, {s.offsets, s.dynamicIndex, s.stepOf}, s.expected, s.y);  // contacts at the start, y
-    s.solveStep(input, report);                           // A, b; filtered PCG until the contacts agree
+    lap.addTo(s.times.contact);
+    s.solveStep(input, report);  // A, b; filtered PCG until the contacts agree
+    report.times = s.times;
     if (!s.u.allFinite() || !s.unfiltered.allFinite()) {  // state untouched; the caller decides
         report.finite = report.converged = false;
         return report;
     }
+    LapTimer closing(input);
     report.passed = s.response.passes({s.v, s.endTwists(), s.unfiltered}, s.y);
+    closing.addTo(report.times.contact);
     s.store(input, report);  // velocities, twists, reactions
     return report;
 }
@@ -361,6 +384,7 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
 }
 
 void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
+    LapTimer lap(input);
     std::vector<CoupledSystem::ShellPart> parts;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const int n = input.shells[k]->vertexCount();
@@ -377,6 +401,7 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
     system.begin(std::move(parts), static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(),
                  std::move(couplings));
     readFreeTwists();
+    lap.addTo(times.assembly);
 }
 
 void IslandSolver::Impl::readFreeTwists() {
@@ -414,13 +439,16 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
     bool roughly = response.isQuick() && response.hasContacts() && lastRounds > 1;
     int round = 0;
     for (;;) {
+        LapTimer lap(input);
         response.writeTo(system);
+        lap.addTo(times.contact);
         if (freshIterations < 0 || lastIterations > 20 + 2 * freshIterations) {
             preconditioner.build(system, settings.preconditioner);
             freshIterations = -1;
         } else {
             preconditioner.updateBodies(system);
         }
+        lap.addTo(times.factor);
         if (freshIterations < 0 || !dynamicBodies.empty()) {
             system.start(start, freeTwist, reference);  // dv = 0
             norm2 = std::max(pcg.residualNorm2(system, preconditioner, reference), floor);
@@ -441,7 +469,9 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         system.residual(u, r, unfiltered);
         if (!u.allFinite() || !unfiltered.allFinite()) return;
         system.velocities(u, v);
+        lap.addTo(times.solve);
         const bool changed = response.update(system, {v, u.w, unfiltered}, y, round, roughly);
+        lap.addTo(times.contact);
         const bool lifted = supports.update(u.w, input.h * input.gravity.norm());
         if (lifted) {
             system.setBodies(supports.masses(), supports.freeTwists());

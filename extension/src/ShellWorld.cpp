@@ -32,9 +32,29 @@ namespace {
 constexpr double kTeleport =
     50.0;  // a body that strays faster than this from what was solved has been teleported [m/s]
 
-double secondsSince(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+double seconds() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
+
+/// A detector whose time is taken.
+class TimedDetector : public ContactDetector {
+  public:
+    TimedDetector(ContactDetector& detector, double& sum) : m_detector(detector), m_sum(sum) {}
+    void find(const ContactPose& pose, double vertexReach, double faceReach, std::vector<Contact>& contacts) override {
+        const double start = seconds();
+        m_detector.find(pose, vertexReach, faceReach, contacts);
+        m_sum += seconds() - start;
+    }
+    void sweep(const ContactSweep& motion, std::vector<Contact>& contacts) override {
+        const double start = seconds();
+        m_detector.sweep(motion, contacts);
+        m_sum += seconds() - start;
+    }
+
+  private:
+    ContactDetector& m_detector;
+    double& m_sum;
+};
 
 /// The broadphase's id of an object of this world, -1 if it is not there. An object that is allocated where a removed
 /// one was has another id (with btDbvtBroadphase; broadphases that count slots may give the same again).
@@ -157,6 +177,7 @@ std::vector<std::string> ShellWorld::takeWarnings() {
 void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     if (!(h > btScalar(0))) return;
     if (m_shells.empty()) return forgetPushes(*world);
+    const double start = seconds();
     WorldReport report{.shells = size()};
     report.rejectedSteps = m_report.rejectedSteps;
     report.unconvergedSteps = m_report.unconvergedSteps;
@@ -186,6 +207,7 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     sleepers.rest(gravity, double(h));
     updateAllBounds(double(h));
     m_impl->manifolds.update(*world, m_shells);
+    m_report.secondsTotal = seconds() - start;
 }
 
 /// Gravity has changed since velocities were solved for: Bullet's bodies have just fallen with the new one.
@@ -245,6 +267,7 @@ void ShellWorld::solveIsland(Island& island, double h) {
     std::vector<CoupledBody> coupled;
     for (const Obstacle& obstacle : island.obstacles) coupled.push_back(obstacle.body);
     ShellContacts contacts(bodies, island.obstacles, island.pairs);
+    TimedDetector timed(contacts, m_report.secondsContact);
     const Vec3 gravity = fromBullet(m_world.getGravity());
     IslandInput input;
     input.h = h;
@@ -254,10 +277,12 @@ void ShellWorld::solveIsland(Island& island, double h) {
     input.bodies = coupled;
     input.couplings = island.couplings;
     input.anchors = island.anchors;
-    input.contacts = island.pairs.empty() ? nullptr : &contacts;
-    const auto start = std::chrono::steady_clock::now();
+    input.contacts = island.pairs.empty() ? nullptr : &timed;
+    input.clock = &seconds;
+    const double start = seconds();
     const StepReport report = m_impl->solvers[island.shells.front()].solve(input);
-    m_report.secondsSolve += secondsSince(start);
+    m_report.secondsSolve += seconds() - start;
+    m_report.times += report.times;
     accept(island, report, coupled, h * gravity);
 }
 

@@ -16,6 +16,7 @@ struct IslandInput {
     std::span<const BodyCoupling> couplings{};
     std::span<const Anchor> anchors{};
     ContactDetector* contacts = nullptr;  ///< none: no contacts
+    double (*clock)() = nullptr;          ///< [s]; null: no times are taken
 };
 
 /// Solves for the velocities of one step: A v = b with contacts as filter, bodies as six unknowns each (see

@@ -5,6 +5,25 @@
 
 namespace jacket {
 
+/// Where the time of a step went, by IslandInput::clock [s]. What is left of the whole step is spent on checks.
+struct StepTimes {
+    double assembly = 0.0;       ///< energies, their derivatives, A and b
+    double factor = 0.0;         ///< building the preconditioner
+    double solve = 0.0;          ///< conjugate gradients
+    double contact = 0.0;        ///< finding contacts, and deciding what they do
+    double selfCollision = 0.0;  ///< of shells with themselves and each other
+
+    double sum() const { return assembly + factor + solve + contact + selfCollision; }
+    StepTimes& operator+=(const StepTimes& other) {
+        assembly += other.assembly;
+        factor += other.factor;
+        solve += other.solve;
+        contact += other.contact;
+        selfCollision += other.selfCollision;
+        return *this;
+    }
+};
+
 /// What one step did.
 struct StepReport {
     int pcgIterations = 0;  ///< over all solves of the step
@@ -15,6 +34,7 @@ struct StepReport {
     bool limited = false;   ///< Newton did not settle and the step would have gained energy: deformation was cut short
     bool passed = false;    ///< a fast body is through a shell at the end of the step
     double deepestGap = 0.0;  ///< most negative predicted gap that was left at the end of the step [m], <= 0
+    StepTimes times;          ///< all zero without a clock
     std::vector<ContactImpulse> contacts;  ///< those that carried an impulse
 };
 

@@ -19,12 +19,15 @@ struct Island;
 struct WorldReport {
     int shells = 0, awake = 0, contacts = 0, pcgIterations = 0, solves = 0;
     bool converged = true;
-    bool finite = true;        ///< false: a shell's step was rejected; it stood still
-    int rejectedSteps = 0;     ///< since the world was made
-    int unconvergedSteps = 0;  ///< since the world was made
-    int passedSteps = 0;       ///< since the world was made: those in which a fast body went through a shell
-    bool limited = false;      ///< deformation was cut short, or a step would have gained energy
-    double secondsContact = 0.0, secondsSolve = 0.0;
+    bool finite = true;           ///< false: a shell's step was rejected; it stood still
+    int rejectedSteps = 0;        ///< since the world was made
+    int unconvergedSteps = 0;     ///< since the world was made
+    int passedSteps = 0;          ///< since the world was made: those in which a fast body went through a shell
+    bool limited = false;         ///< deformation was cut short, or a step would have gained energy
+    StepTimes times{};            ///< of the solves, over all islands [s]
+    double secondsContact = 0.0;  ///< of the narrow phase, which times.contact includes
+    double secondsSolve = 0.0;    ///< of the solves in all, narrow phase included
+    double secondsTotal = 0.0;    ///< of everything that shells do in a substep
 };
 
 /// The shells of one Bullet world. Registers itself as an action of the world and leaves it when destroyed; destroy it
