@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numeric>
 
 namespace jacket::demo {
@@ -51,23 +52,24 @@ bool isFinite(const World& world, const std::vector<BodyState>& bodies) {
     });
 }
 
-/// How deep a shell reaches into a body [m]; 0: not at all.
-double depthIn(const BodyState& body, const Shell& shell) {
-    const Shape& shape = body.description->shape;
-    const double radius = boundingRadius(shape);
-    const Mat3 toBody = body.rotation.transpose();
-    double deepest = 0.0;
-    const auto see = [&](const Vec3& point) {
-        const Vec3 offset = point - body.position;
-        if (offset.squaredNorm() < radius * radius)
-            deepest = std::max(deepest, -signedDistance(shape, toBody * offset));
-    };
-    const Points& x = shell.positions();
-    for (int i = 0; i < x.cols(); ++i) see(x.col(i));
-    for (const auto& edge : shell.mesh().edges()) see(0.5 * (x.col(edge.v0) + x.col(edge.v1)));
-    for (const auto& t : shell.mesh().triangles().colwise()) see((x.col(t[0]) + x.col(t[1]) + x.col(t[2])) / 3.0);
-    return deepest;
-}
+/// FNV-1a of whatever is added.
+class Hash {
+  public:
+    template <class Matrix>
+    void add(const Matrix& values) {
+        const auto* bytes = reinterpret_cast<const unsigned char*>(values.data());
+        for (std::size_t i = 0; i < sizeof(double) * static_cast<std::size_t>(values.size()); ++i)
+            m_value = (m_value ^ bytes[i]) * 1099511628211ull;
+    }
+    std::string text() const {
+        char digits[17];
+        std::snprintf(digits, sizeof digits, "%016llx", m_value);
+        return digits;
+    }
+
+  private:
+    unsigned long long m_value = 14695981039346656037ull;
+};
 
 /// Force of the shell's pressure on each vertex, a third of each triangle's.
 Points pressureForces(const Shell& shell) {
@@ -134,12 +136,44 @@ FrameRecord measure(const World& world, int frame, const FrameReport& report) {
     return record;
 }
 
+double depthIn(const BodyState& body, const Points& x, const HalfEdgeMesh& mesh) {
+    const Shape& shape = body.description->shape;
+    const double radius = boundingRadius(shape);
+    const Mat3 toBody = body.rotation.transpose();
+    double deepest = 0.0;
+    const auto see = [&](const Vec3& point) {
+        const Vec3 offset = point - body.position;
+        if (offset.squaredNorm() < radius * radius)
+            deepest = std::max(deepest, -signedDistance(shape, toBody * offset));
+    };
+    for (int i = 0; i < x.cols(); ++i) see(x.col(i));
+    for (const auto& edge : mesh.edges()) see(0.5 * (x.col(edge.v0) + x.col(edge.v1)));
+    for (const auto& t : mesh.triangles().colwise()) see((x.col(t[0]) + x.col(t[1]) + x.col(t[2])) / 3.0);
+    return deepest;
+}
+
+std::string stateHash(const World& world) {
+    Hash hash;
+    for (int k = 0; k < world.shellCount(); ++k) {
+        hash.add(world.shell(k).positions());
+        hash.add(world.shell(k).velocities());
+    }
+    for (const BodyState& body : world.bodies()) {
+        hash.add(body.position);
+        hash.add(body.rotation);
+        hash.add(body.velocity);
+        hash.add(body.angularVelocity);
+    }
+    return hash.text();
+}
+
 Penetration deepestPenetration(const World& world) {
     Penetration deepest;
     const auto bodies = world.bodies();
     for (std::size_t b = 0; b < bodies.size(); ++b)
         for (int k = 0; k < world.shellCount(); ++k)
-            if (const double depth = depthIn(bodies[b], world.shell(k)); depth > deepest.depth)
+            if (const double depth = depthIn(bodies[b], world.shell(k).positions(), world.shell(k).mesh());
+                depth > deepest.depth)
                 deepest = {depth, k, static_cast<int>(b)};
     return deepest;
 }

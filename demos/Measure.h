@@ -36,6 +36,13 @@ FrameRecord measure(const World& world, int frame, const FrameReport& report = {
 /// Of vertices, edge midpoints and centroids, inside the true surface of a body.
 Penetration deepestPenetration(const World& world);
 
+/// How deep a surface reaches into a body: of its vertices, edge midpoints and centroids [m]; 0: not at all.
+double depthIn(const BodyState& body, const Points& positions, const HalfEdgeMesh& mesh);
+
+/// 16 hexadecimal digits that stand for every bit of the shells' positions and velocities and the bodies' poses and
+/// velocities (FNV-1a).
+std::string stateHash(const World& world);
+
 /// Mass of shells and moving bodies [kg].
 double movingMass(const World& world);
 

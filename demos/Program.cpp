@@ -30,13 +30,17 @@ int reportUsage(const CLI::App& app, const CLI::ParseError& error) {
     return kBadInput;
 }
 
-/// A misspelt command; CLI11 would say that one is required.
-void checkCommand(const CLI::App& app, int argc, const char* const* argv) {
-    if (argc < 2 || argv[1][0] == '-') return;
+/// A misspelt command, or a misspelt part of one such as `sweep`; CLI11 would say that one is required.
+void checkCommand(const CLI::App& app, int argc, const char* const* argv, int at = 1) {
+    const std::vector<const CLI::App*> commands = app.get_subcommands([](const CLI::App*) { return true; });
+    if (commands.empty() || argc <= at || argv[at][0] == '-') return;
     std::vector<std::string> names;
-    for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
-    if (std::find(names.begin(), names.end(), argv[1]) == names.end())
-        throw InputError("there is no command \"" + std::string(argv[1]) + "\"" + suggestion(argv[1], names));
+    for (const CLI::App* command : commands) {
+        if (command->get_name() == argv[at]) return checkCommand(*command, argc, argv, at + 1);
+        names.push_back(command->get_name());
+    }
+    throw InputError("there is no command \"" + (at == 1 ? "" : app.get_name() + " ") + argv[at] + "\"" +
+                     suggestion(argv[at], names));
 }
 
 }  // namespace

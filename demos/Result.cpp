@@ -4,17 +4,11 @@
 #include <cmath>
 #include <ostream>
 
+#include "Quantile.h"
+
 namespace jacket::demo {
 
 namespace {
-
-/// Value below which the given share of the values lies.
-double quantile(std::vector<double> values, double share) {
-    if (values.empty()) return 0.0;
-    std::sort(values.begin(), values.end());
-    const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size())));
-    return values[std::clamp<std::size_t>(rank, 1, values.size()) - 1];
-}
 
 /// JSON has no infinity and no NaN.
 Json numberOrNull(double x) {
@@ -112,6 +106,7 @@ Json Result::json(const World& end) const {
     result["finite"] = m_finite;
     result["rejected_steps"] = end.rejectedSteps();
     result["passed_steps"] = end.passedSteps();
+    result["state"] = stateHash(end);
     result["shells"] = shellsToJson(end);
     for (std::size_t k = 0; k < m_yielding.size(); ++k) {
         const auto& [most, time] = m_yielding[k];

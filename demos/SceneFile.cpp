@@ -24,6 +24,8 @@ std::vector<fs::path> sceneFolders() {
     return folders;
 }
 
+}  // namespace
+
 std::string readText(const fs::path& file) {
     std::error_code error;
     if (!fs::exists(file, error)) throw InputError(file.string() + ": there is no such file");
@@ -32,8 +34,6 @@ std::string readText(const fs::path& file) {
     if (!in) throw InputError(file.string() + ": cannot be read");
     return {std::istreambuf_iterator<char>(in), {}};
 }
-
-}  // namespace
 
 std::vector<fs::path> bundledScenes() {
     std::vector<fs::path> scenes;

@@ -24,6 +24,9 @@ struct SceneChanges {
 
 Scene loadScene(const std::filesystem::path& file, const SceneChanges& changes = {});
 
+/// The whole of a file; throws InputError.
+std::string readText(const std::filesystem::path& file);
+
 /// Its "description", also when the rest of the scene cannot be read; "" without one.
 std::string sceneDescription(const std::filesystem::path& file);
 

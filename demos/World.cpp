@@ -2,197 +2,37 @@
 
 #include <BulletDynamics/Featherstone/btMultiBodyConstraintSolver.h>
 #include <BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h>
-#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 #include <btBulletDynamicsCommon.h>
 
-#include <chrono>
-#include <cmath>
-#include <numbers>
 #include <type_traits>
 
+#include "Bodies.h"
+#include "Clocks.h"
 #include "Convert.h"
 #include "Loads.h"
 #include "Meshes.h"
-#include "MultiBody.h"
 #include "jacket/bullet/ShellWorld.h"
 
 namespace jacket::demo {
 
-namespace {
-
-/// Bullet's rounding of edges between bodies, kept small beside the shape: it would show as a gap.
-btScalar smallMargin(double size) {
-    return btScalar(0.002 * size);
-}
-
-/// What shapes are made of, which Bullet does not own.
-struct ShapeParts {
-    std::vector<std::unique_ptr<btCollisionShape>> shapes;
-    std::vector<std::unique_ptr<btStridingMeshInterface>> meshes;
-};
-
-/// A shape as Bullet's, with its centre of mass at the origin.
-struct CentredShape {
-    std::unique_ptr<btCollisionShape> shape;
-    btTransform centre = btTransform::getIdentity();  ///< in the shape's frame; its axes are the principal ones
-};
-
-struct MakeCollisionShape {
-    ShapeParts& parts;
-    using Pointer = std::unique_ptr<btCollisionShape>;
-    Pointer operator()(const Sphere& s) const { return std::make_unique<btSphereShape>(btScalar(s.radius)); }
-    Pointer operator()(const Box& s) const { return std::make_unique<btBoxShape>(toBullet(Vec3(0.5 * s.size))); }
-    Pointer operator()(const Capsule& s) const {
-        return std::make_unique<btCapsuleShape>(btScalar(s.radius), btScalar(s.height));
-    }
-    Pointer operator()(const Cylinder& s) const {
-        return std::make_unique<btCylinderShape>(toBullet(Vec3(s.radius, 0.5 * s.height, s.radius)));
-    }
-    Pointer operator()(const Cone& s) const {
-        auto shape = std::make_unique<btConeShape>(btScalar(s.radius), btScalar(s.height));
-        shape->setMargin(smallMargin(std::min(s.radius, s.height)));
-        return shape;
-    }
-    Pointer operator()(const Plane& s) const {
-        return std::make_unique<btStaticPlaneShape>(toBullet(s.normal), btScalar(s.offset));
-    }
-    Pointer operator()(const Hull& s) const {
-        auto shape = std::make_unique<btConvexHullShape>();
-        const Points& vertices = s.geometry->vertices();
-        for (int i = 0; i < vertices.cols(); ++i)
-            shape->addPoint(toBullet(Vec3(vertices.col(i) - s.geometry->centroid())), false);
-        shape->recalcLocalAabb();
-        shape->setMargin(smallMargin(std::cbrt(s.geometry->volume())));
-        return shape;
-    }
-    Pointer operator()(const Mesh& s) const {
-        auto mesh = std::make_unique<btTriangleMesh>();
-        const Points& x = s.geometry->vertices();
-        for (const auto& t : s.geometry->triangles().colwise())
-            mesh->addTriangle(toBullet(Vec3(x.col(t[0]))), toBullet(Vec3(x.col(t[1]))), toBullet(Vec3(x.col(t[2]))));
-        auto shape = std::make_unique<btBvhTriangleMeshShape>(mesh.get(), true);
-        parts.meshes.push_back(std::move(mesh));
-        return shape;
-    }
-    Pointer operator()(const Compound& s) const;
-};
-
-/// Of bodies that may move [m^3]; parts of a compound that overlap count twice.
-struct Volume {
-    double operator()(const Sphere& s) const { return 4.0 / 3.0 * std::numbers::pi * std::pow(s.radius, 3); }
-    double operator()(const Box& s) const { return s.size.prod(); }
-    double operator()(const Capsule& s) const {
-        return std::numbers::pi * s.radius * s.radius * (s.height + 4.0 / 3.0 * s.radius);
-    }
-    double operator()(const Cylinder& s) const { return std::numbers::pi * s.radius * s.radius * s.height; }
-    double operator()(const Cone& s) const { return std::numbers::pi * s.radius * s.radius * s.height / 3.0; }
-    double operator()(const Plane&) const { return 0.0; }
-    double operator()(const Hull& s) const { return s.geometry->volume(); }
-    double operator()(const Mesh&) const { return 0.0; }
-    double operator()(const Compound& s) const {
-        double sum = 0.0;
-        for (const CompoundPart& part : s.parts) sum += std::visit(*this, part.shape);
-        return sum;
-    }
-};
-
-CentredShape centred(const Shape& shape, ShapeParts& parts) {
-    CentredShape result{std::visit(MakeCollisionShape{parts}, shape)};
-    if (const auto* hull = std::get_if<Hull>(&shape)) result.centre.setOrigin(toBullet(hull->geometry->centroid()));
-    const auto* compound = std::get_if<Compound>(&shape);
-    const double volume = compound ? Volume{}(*compound) : 0.0;
-    if (!(volume > 0)) return result;  // of meshes: cannot move
-    auto& children = static_cast<btCompoundShape&>(*result.shape);
-    std::vector<btScalar> masses;
-    for (const CompoundPart& part : compound->parts)
-        masses.push_back(btScalar(std::visit(Volume{}, part.shape) / volume));
-    btVector3 inertia;
-    children.calculatePrincipalAxisTransform(masses.data(), result.centre, inertia);
-    for (int i = 0; i < children.getNumChildShapes(); ++i)
-        children.updateChildTransform(i, result.centre.inverse() * children.getChildTransform(i), false);
-    children.recalculateLocalAabb();
-    return result;
-}
-
-MakeCollisionShape::Pointer MakeCollisionShape::operator()(const Compound& s) const {
-    auto compound = std::make_unique<btCompoundShape>();
-    for (const CompoundPart& part : s.parts) {
-        CentredShape child = centred(part.shape, parts);
-        compound->addChildShape(toBullet(part.transform) * child.centre, child.shape.get());
-        parts.shapes.push_back(std::move(child.shape));
-    }
-    return compound;
-}
-
-/// Principal moments of a shape whose centre of mass is its origin. Bullet's own of a compound are those of its box.
-btVector3 inertiaOf(const btCollisionShape& shape, const Shape& description, double mass) {
-    btVector3 inertia(0, 0, 0);
-    const auto* compound = std::get_if<Compound>(&description);
-    if (!compound) {
-        shape.calculateLocalInertia(btScalar(mass), inertia);
-        return inertia;
-    }
-    const auto& children = static_cast<const btCompoundShape&>(shape);
-    Mat3 sum = Mat3::Zero();
-    for (int i = 0; i < children.getNumChildShapes(); ++i) {
-        const Shape& part = compound->parts[i].shape;
-        const double share = mass * std::visit(Volume{}, part) / Volume{}(*compound);
-        const Vec3 own = fromBullet(inertiaOf(*children.getChildShape(i), part, share));
-        const Mat3 axes = fromBullet(children.getChildTransform(i).getBasis());
-        const Mat3 arm = skew(fromBullet(children.getChildTransform(i).getOrigin()));
-        sum += axes * own.asDiagonal() * axes.transpose() - share * arm * arm;
-    }
-    return toBullet(Vec3(sum.diagonal()));
-}
-
-void loadGeometry(Shape& shape, const std::string& label) {
-    if (auto* hull = std::get_if<Hull>(&shape)) hull->geometry = loadHull(hull->file, label);
-    if (auto* mesh = std::get_if<Mesh>(&shape)) mesh->geometry = loadSurface(mesh->file, label);
-    if (auto* compound = std::get_if<Compound>(&shape))
-        for (CompoundPart& part : compound->parts) loadGeometry(part.shape, label);
-}
-
-}  // namespace
-
 struct World::Impl {
-    /// A body leaves the world before it ends, also when a later part of the scene turns out to be wrong.
-    struct RemoveBody {
-        btDynamicsWorld* world;
-        void operator()(btRigidBody* body) const {
-            world->removeRigidBody(body);
-            delete body;
-        }
-    };
-    /// A body and what it needs to live.
-    struct Body {
-        const BodyDescription* description = nullptr;
-        ShapeParts parts;
-        std::unique_ptr<btCollisionShape> shape;
-        std::unique_ptr<btRigidBody, RemoveBody> body{nullptr, RemoveBody{nullptr}};
-        /// Centre of mass and principal axes in the shape's frame: Bullet's bodies are described from there.
-        btTransform centre = btTransform::getIdentity();
-        btVector3 inertia{0, 0, 0};
-        const MultiBody* multiBody = nullptr;  ///< that it is part of, instead of `body`
-        std::size_t part = 0;                  ///< of it
-    };
-
     /// Multibodies need a world of their own kind, whose solver treats friction between bodies a little differently.
     std::unique_ptr<btDiscreteDynamicsWorld> makeWorld() {
+        std::unique_ptr<btDiscreteDynamicsWorld> made;
         if (scene.multiBodies.empty()) {
             solver = std::make_unique<btSequentialImpulseConstraintSolver>();
-            return std::make_unique<btDiscreteDynamicsWorld>(&dispatcher, &broadphase, solver.get(), &configuration);
+            made = std::make_unique<btDiscreteDynamicsWorld>(&dispatcher, &broadphase, solver.get(), &configuration);
+        } else {
+            auto multiBodySolver = std::make_unique<btMultiBodyConstraintSolver>();
+            made = std::make_unique<btMultiBodyDynamicsWorld>(&dispatcher, &broadphase, multiBodySolver.get(),
+                                                              &configuration);
+            solver = std::move(multiBodySolver);
         }
-        auto multiBodySolver = std::make_unique<btMultiBodyConstraintSolver>();
-        auto made =
-            std::make_unique<btMultiBodyDynamicsWorld>(&dispatcher, &broadphase, multiBodySolver.get(), &configuration);
-        solver = std::move(multiBodySolver);
+        made->setGravity(toBullet(scene.gravity));
         return made;
     }
 
     explicit Impl(const Scene& s) : scene(s) {
-        world->setGravity(toBullet(scene.gravity));
-        for (BodyDescription& body : scene.bodies) addBody(body);
-        for (const MultiBodyDescription& multiBody : scene.multiBodies) addMultiBody(multiBody);
         for (std::size_t k = 0; k < scene.shells.size(); ++k) addShell(scene.shells[k], scene.seed + k);
         for (const ProbeDescription& probe : scene.probes)
             if (probe.where) probe.where->vertices(starts[probe.shell]);  // throws now rather than after the run
@@ -201,53 +41,6 @@ struct World::Impl {
             throw InputError(
                 "mode: \"static\" settles shells under gravity, forces and pressure alone; the scene has " +
                 std::string(scene.wind ? "wind" : "bodies"));
-    }
-
-    void addBody(BodyDescription& description) {
-        Body entry;
-        entry.description = &description;
-        loadGeometry(description.shape, description.label);
-        CentredShape centredShape = centred(description.shape, entry.parts);
-        entry.shape = std::move(centredShape.shape);
-        entry.centre = centredShape.centre;
-        const auto mass = btScalar(description.mass);
-        if (mass > 0) entry.inertia = inertiaOf(*entry.shape, description.shape, description.mass);
-        if (description.isOfMultiBody) {
-            bodies.push_back(std::move(entry));
-            return;
-        }
-        btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, entry.shape.get(), entry.inertia);
-        info.m_friction = btScalar(description.friction);
-        info.m_startWorldTransform = toBullet(description.transform) * entry.centre;
-        entry.body = decltype(entry.body)(new btRigidBody(info), RemoveBody{world.get()});
-        if (!scene.maySleep() || !description.kinematic.empty())
-            entry.body->setActivationState(
-                DISABLE_DEACTIVATION);  // Bullet puts bodies to sleep that still swing slowly
-        entry.body->setLinearVelocity(toBullet(description.velocity));
-        entry.body->setAngularVelocity(toBullet(description.angularVelocity));
-        if (!description.kinematic.empty())
-            entry.body->setCollisionFlags(entry.body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
-        world->addRigidBody(entry.body.get());
-        bodies.push_back(std::move(entry));
-    }
-
-    void addMultiBody(const MultiBodyDescription& description) {
-        std::vector<int> indices{description.base};
-        for (const LinkDescription& link : description.links) indices.push_back(link.body);
-        std::vector<MultiBodyPart> parts;
-        for (const int i : indices) {
-            if (!(bodies[i].centre.getBasis() == btMatrix3x3::getIdentity()))
-                throw InputError(bodies[i].description->label +
-                                 ".compound: the principal axes of a multibody's part must be those of its frame");
-            parts.push_back({bodies[i].description, bodies[i].shape.get(), fromBullet(bodies[i].centre.getOrigin()),
-                             fromBullet(bodies[i].inertia)});
-        }
-        auto& multiBodyWorld = static_cast<btMultiBodyDynamicsWorld&>(*world);
-        multiBodies.push_back(std::make_unique<MultiBody>(multiBodyWorld, description, parts));
-        for (std::size_t k = 0; k < indices.size(); ++k) {
-            bodies[indices[k]].multiBody = multiBodies.back().get();
-            bodies[indices[k]].part = k;
-        }
     }
 
     void addShell(const ShellDescription& description, std::uint64_t seed) {
@@ -316,8 +109,7 @@ struct World::Impl {
 
     /// Everything to its equilibrium, without time.
     void settle(FrameReport& report) {
-        using Clock = std::chrono::steady_clock;
-        const auto start = Clock::now();
+        const double start = wallSeconds();
         for (int k = 0; k < shells.size(); ++k) {
             const StaticReport done =
                 shells[k].settle(world->getGravity(), {.increments = scene.loadIncrements, .maxIterations = 200});
@@ -325,7 +117,7 @@ struct World::Impl {
             report.solves += done.iterations;
             report.dents.emplace_back();
         }
-        report.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+        report.seconds = wallSeconds() - start;
     }
 
     void noteDents(FrameReport& report) {
@@ -350,30 +142,13 @@ struct World::Impl {
         shell.setPressure(description.pressure);
     }
 
-    /// Puts kinematic bodies where they are at the end of the coming step; Bullet takes their velocity from that.
-    void moveKinematicBodies(double end) {
-        for (Body& body : bodies) {
-            if (body.description->kinematic.empty()) continue;
-            const Transform& start = body.description->transform;
-            Vec3 origin = start.position;
-            double begun = 0.0;
-            for (const auto& [velocity, until] : body.description->kinematic) {
-                origin += std::max(0.0, std::min(end, until) - begun) * velocity;
-                begun = until;
-            }
-            const Transform pose{origin, start.rotationDeg};
-            body.body->setWorldTransform(toBullet(pose) * body.centre);
-        }
-    }
-
     void step(FrameReport& report) {
         const double h = scene.dt / scene.substeps;
-        moveKinematicBodies(time + h);
-        for (const auto& multiBody : multiBodies) multiBody->drive(time, h);
-        using Clock = std::chrono::steady_clock;
-        const auto start = Clock::now();
+        bodies.prepareStep(time, h);
+        const double start = wallSeconds(), cpuStart = cpuSeconds();
         world->stepSimulation(btScalar(h), 0);  // 0: exactly one step, of exactly h
-        report.seconds += std::chrono::duration<double>(Clock::now() - start).count();
+        report.cpuSeconds += cpuSeconds() - cpuStart;
+        report.seconds += wallSeconds() - start;
         time += h;
         const bullet::WorldReport& last = shells.lastStep();
         report.contacts = last.contacts;
@@ -382,31 +157,11 @@ struct World::Impl {
         report.solves += last.solves;
         report.converged = report.converged && last.converged;
         report.finite = report.finite && last.finite;
+        report.where.narrowPhase += last.secondsContact;
+        report.where.parts += last.times;
+        report.where.solves += last.secondsSolve;
+        report.where.shells += last.secondsTotal;
         noteDents(report);
-    }
-
-    BodyState state(const Body& body) const {
-        const btCollisionObject* object = body.body.get();
-        if (body.multiBody) object = &body.multiBody->collider(body.part);
-        const btTransform& centre = object->getWorldTransform();
-        const btTransform pose = centre * body.centre.inverse();
-        const Mat3 axes = fromBullet(body.centre.getBasis());
-        BodyState state;
-        state.description = body.description;
-        state.isDynamic = body.description->mass > 0;
-        state.rotation = fromBullet(pose.getBasis());
-        state.centre = fromBullet(centre.getOrigin());
-        state.position = fromBullet(pose.getOrigin());
-        state.inertia = axes * fromBullet(body.inertia).asDiagonal() * axes.transpose();
-        if (body.multiBody) {
-            const MultiBody::Velocities velocities = body.multiBody->velocities();
-            state.velocity = velocities.linear[body.part];
-            state.angularVelocity = velocities.angular[body.part];
-        } else {
-            state.velocity = fromBullet(body.body->getLinearVelocity());
-            state.angularVelocity = fromBullet(body.body->getAngularVelocity());
-        }
-        return state;
     }
 
     Scene scene;
@@ -415,8 +170,7 @@ struct World::Impl {
     btDbvtBroadphase broadphase;
     std::unique_ptr<btConstraintSolver> solver;
     std::unique_ptr<btDiscreteDynamicsWorld> world = makeWorld();
-    std::vector<Body> bodies;
-    std::vector<std::unique_ptr<MultiBody>> multiBodies;
+    Bodies bodies{*world, scene};
     bullet::ShellWorld shells{*world};
     std::vector<Points> starts;  ///< positions at time 0, unperturbed
     double time = 0.0;
@@ -474,9 +228,7 @@ Points World::contactForces(int shell) const {
 }
 
 std::vector<BodyState> World::bodies() const {
-    std::vector<BodyState> states;
-    for (const auto& body : m_impl->bodies) states.push_back(m_impl->state(body));
-    return states;
+    return m_impl->bodies.states();
 }
 
 Vec3 World::linearMomentum() const {

@@ -22,6 +22,14 @@ struct BodyState {
     Mat3 inertia = Mat3::Zero();          ///< about the centre, in the frame's axes [kg m^2]
 };
 
+/// Where the wall time of steps went, each part inside the one below it [s].
+struct StepSeconds {
+    double narrowPhase = 0.0;  ///< finding where shells meet bodies
+    StepTimes parts{};         ///< of the shells' solves
+    double solves = 0.0;       ///< of islands of shells
+    double shells = 0.0;       ///< everything that shells do
+};
+
 /// What the steps of one frame did and cost.
 struct FrameReport {
     int contacts = 0;        ///< that carried an impulse in the last step
@@ -31,6 +39,8 @@ struct FrameReport {
     bool converged = true, finite = true;
     std::vector<Dent> dents;  ///< of each shell: where it yielded most, and how much in all steps of the frame
     double seconds = 0.0;     ///< of wall time in stepSimulation
+    double cpuSeconds = 0.0;  ///< of this thread's time there
+    StepSeconds where{};      ///< of `seconds`
 };
 
 class World {

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <complex>
 #include <cstdio>
-#include <ctime>
 #include <limits>
 #include <numbers>
 
@@ -177,12 +176,6 @@ constexpr const char* kSweepText =
     "tolerances 0.01 and 0.0001";
 
 }  // namespace
-
-double cpuSeconds() {
-    std::timespec time{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 std::string nameOf(Integrator integrator) {
     return integrator == Integrator::BackwardEuler ? "backward-euler"

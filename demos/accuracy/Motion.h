@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "Clocks.h"
 #include "Problem.h"
 #include "jacket/Shell.h"
 
@@ -70,8 +71,5 @@ MotionProblem vibratingStrip();
 MotionProblem trampoline();
 double trampolineHeight(const MotionCase& motion, double simulated, MotionResult& result);
 std::string computeStripReference();
-
-/// CPU time of this thread [s].
-double cpuSeconds();
 
 }  // namespace jacket::demo::accuracy

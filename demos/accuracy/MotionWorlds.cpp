@@ -1,6 +1,4 @@
 #include <BulletSoftBody/btDefaultSoftBodySolver.h>
-#include <BulletSoftBody/btSoftBody.h>
-#include <BulletSoftBody/btSoftBodyHelpers.h>
 #include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>
 #include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
 #include <btBulletDynamicsCommon.h>
@@ -12,6 +10,7 @@
 
 #include "Motion.h"
 #include "MotionMesh.h"
+#include "SoftSheet.h"
 #include "TrampolineReference.h"
 #include "jacket/bullet/ShellWorld.h"
 
@@ -98,36 +97,25 @@ double heightOnShell(const MotionCase& motion, double simulated, MotionResult& r
     });
 }
 
-/// btSoftBody knows no Young's modulus: its links, also those across two cells, are as stiff as they go, and its
-/// positions are solved 10 times a step.
+/// btSoftBody on the same grid: see SoftSheet.
 double heightOnSoftBody(const MotionCase& motion, double simulated, MotionResult& result) {
-    const auto kMargin = btScalar(0.05);
     Stage stage;
     auto& info = stage.world.getWorldInfo();
     info.m_gravity = stage.world.getGravity();
     info.m_sparsesdf.Initialize();
-    const auto a = btScalar(0.5 * kSize);
-    const int nodes = motion.cells + 1;
-    btSoftBody* sheet =
-        btSoftBodyHelpers::CreatePatch(info, {-a, 0, -a}, {a, 0, -a}, {-a, 0, a}, {a, 0, a}, nodes, nodes, 0, false);
-    const double cell = kSize / motion.cells;
-    for (int i = 0; i < sheet->m_nodes.size(); ++i) {
-        const btVector3& x = sheet->m_nodes[i].m_x;
-        const bool pinned = std::max(std::abs(x.x()), std::abs(x.z())) > a * btScalar(1 - 1e-5);
-        sheet->setMass(i, pinned ? 0 : btScalar(kAreaDensity * cell * cell));
-    }
-    sheet->m_materials[0]->m_kLST = 1;
-    sheet->m_cfg.piterations = 10;
-    sheet->m_cfg.kDF = 0;
-    sheet->generateBendingConstraints(2);
-    sheet->getCollisionShape()->setMargin(kMargin);  // a thinner one lets the ball through sooner
-    stage.world.addSoftBody(sheet);
+    SoftSheet sheet;
+    sheet.mesh = makeSheet(MeshKind::OneDiagonal, {kSize, kSize}, {motion.cells, motion.cells});
+    sheet.links = gridLinks(sheet.mesh, motion.cells + 1);
+    sheet.masses = lumpedMasses(sheet.mesh, kAreaDensity);
+    for (int i = 0; i < sheet.mesh.positions.cols(); ++i)
+        if (sheet.mesh.positions.col(i).cwiseAbs().maxCoeff() > 0.5 * kSize * (1 - 1e-9)) sheet.masses[i] = 0.0;
+    const std::unique_ptr<btSoftBody> body = makeSoftBody(info, sheet);
+    stage.world.addSoftBody(body.get());
     stage.addBall(kBallMass, kRadius, {0, btScalar(kRadius + kThickness), 0});
     stage.ball->setDamping(btScalar(kBallDamping), 0);
-    result.vertices = sheet->m_nodes.size();
+    result.vertices = body->m_nodes.size();
     const double height = restingHeight(stage, motion.dt, simulated, result, [] {});
-    stage.world.removeSoftBody(sheet);
-    delete sheet;
+    stage.world.removeSoftBody(body.get());
     return height;
 }
 

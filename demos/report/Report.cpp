@@ -3,13 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <set>
-#include <thread>
-
-#include "World.h"
 
 namespace jacket::demo::report {
 
@@ -232,26 +228,6 @@ Trials trialsOf(const Report& report, const MotionProblem& problem, bool withSof
         result.rows.push_back(static_cast<int>(i));
     }
     return result;
-}
-
-Machine thisMachine() {
-    Machine machine;
-    std::ifstream info("/proc/cpuinfo");
-    for (std::string line; std::getline(info, line) && machine.cpu.empty();)
-        if (line.starts_with("model name")) machine.cpu = line.substr(line.find(':') + 2);
-    if (machine.cpu.empty()) machine.cpu = "unknown processor";
-    machine.cores = static_cast<int>(std::thread::hardware_concurrency());
-#if defined(__clang__)
-    machine.compiler = "Clang " __clang_version__;
-#elif defined(__GNUC__)
-    machine.compiler = "GCC " __VERSION__;
-#else
-    machine.compiler = "unknown compiler";
-#endif
-    machine.flags = JACKET_BUILD_FLAGS;
-    machine.precision = World::precision();
-    machine.bullet = World::bulletVersion();
-    return machine;
 }
 
 Report makeReport(bool quick, const std::function<bool(int done, int all)>& progress) {

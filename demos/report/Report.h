@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "Machine.h"
 #include "Pareto.h"
 #include "accuracy/Motion.h"
 #include "accuracy/Problem.h"
@@ -15,12 +16,6 @@ inline constexpr double kAcceptedErrors[] = {0.10, 0.03, 0.01, 0.003};
 /// Choices for many problems at once bear these names.
 inline constexpr const char* kEveryProblem = "every problem";
 inline constexpr const char* kEveryFlatProblem = "every problem of a flat sheet";
-
-struct Machine {
-    std::string cpu, compiler, flags, precision, bullet;
-    int cores = 0;
-};
-Machine thisMachine();
 
 struct StaticRow {
     const accuracy::Problem* problem = nullptr;

@@ -1,0 +1,16 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace jacket::demo {
+
+/// Value below which the given share of the values lies; 0 of none.
+inline double quantile(std::vector<double> values, double share) {
+    if (values.empty()) return 0.0;
+    std::sort(values.begin(), values.end());
+    const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size())));
+    return values[std::clamp<std::size_t>(rank, 1, values.size()) - 1];
+}
+
+}  // namespace jacket::demo
