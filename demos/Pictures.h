@@ -22,12 +22,15 @@ class Pictures {
     /// Draws folder/000000.png ..., named by frame; `drawn(i)` is called after each. Stops early when it returns false.
     void write(const std::filesystem::path& folder, int width, int height, const std::function<bool(int)>& drawn) const;
 
-  private:
     struct Moment {
         int frame;
-        std::vector<Eigen::Matrix3Xf> shells;
+        std::vector<Eigen::Matrix3Xf> shells;  ///< positions [m]
         std::vector<BodyState> bodies;
     };
+    const std::vector<Moment>& moments() const { return m_moments; }
+    const std::vector<Surface>& bodySurfaces() const { return m_bodySurfaces; }  ///< in the bodies' frames
+
+  private:
     Eigen::Matrix3Xf whatToShow() const;
     Camera camera(const Eigen::Matrix3Xf& points, double aspect) const;
 

@@ -3,29 +3,14 @@
 #include <algorithm>
 #include <vector>
 
-#include "Commands.h"
 #include "Json.h"
+#include "RunProgram.h"
 #include "TemporaryFolder.h"
 
 namespace jacket::demo {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Outcome {
-    int exitCode;
-    std::string out, err;
-};
-
-Outcome jacket(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), "jacket");
-    std::vector<const char*> argv;
-    for (const std::string& argument : arguments) argv.push_back(argument.c_str());
-    testing::internal::CaptureStdout();
-    testing::internal::CaptureStderr();
-    const int exitCode = runProgram(static_cast<int>(argv.size()), argv.data());
-    return {exitCode, testing::internal::GetCapturedStdout(), testing::internal::GetCapturedStderr()};
-}
 
 constexpr const char* kFallingSheet = R"({
     "seconds": 0.1, "gravity": [0, -10, 0],
@@ -111,6 +96,9 @@ TEST(Program, BadInputIsExitCode2WithOneMessageAndNothingWritten) {
         {{"run", scene, "--set", "shells.0.pin=[{\"box\":[[5,5,5],[6,6,6]]}]"}, "selects no vertex"},
         {{"run", scene, "--set", "shells.0.material.thickness=-1"}, "must be > 0, got -1"},
         {{"run", scene, "--set", "probes.0.box=[[5,5,5],[6,6,6]]"}, "probes.0.box selects no vertex"},
+        {{"run", scene, "--threads", "0"}, "--threads must be >= 1, got 0"},
+        {{"run", scene, "--threads", "3"}, "solves with one thread"},
+        {{"run", "cantilever", "--profile"}, "takes no steps"},
         {{"run", scene, "--png", "0"}, "--png must be >= 1"},
         {{"run", scene, "--png", "1", "--size", "big"}, "--size must be WIDTHxHEIGHT"},
     };

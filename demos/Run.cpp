@@ -1,0 +1,158 @@
+#include "Run.h"
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+#include <optional>
+
+#include "Clocks.h"
+#include "Pictures.h"
+#include "Profile.h"
+#include "Progress.h"
+#include "ViewPage.h"
+
+namespace jacket::demo {
+
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+struct Size {
+    int width, height;
+};
+
+Size readSize(const std::string& text) {
+    Size size{};
+    char rest = 0;
+    constexpr int kLeast = 16, kMost = 8192;
+    const bool isRead = std::sscanf(text.c_str(), "%dx%d%c", &size.width, &size.height, &rest) == 2;
+    if (!isRead || std::min(size.width, size.height) < kLeast || std::max(size.width, size.height) > kMost)
+        throw InputError("--size must be WIDTHxHEIGHT in pixels, 16..8192 each, got " + text);
+    return size;
+}
+
+/// Where files and pictures of a run go, if anywhere.
+class Files {
+  public:
+    Files(const RunOutput& output, const World& start) {
+        if (output.out.empty()) return;
+        m_directory.emplace(output.out);
+        m_recorder.emplace(m_directory->folder(), start);
+        if (output.pictureEvery > 0) m_pictures.emplace(start, output.pictureEvery);
+        if (output.html) m_page.emplace(start);
+        m_size = readSize(output.size);
+    }
+    void add(const FrameRecord& frame, const World& world) {
+        if (m_recorder) m_recorder->add(frame, world);
+        if (m_pictures) m_pictures->add(world, frame.frame);
+        if (m_page) m_page->add(world, frame.frame);
+    }
+    void finish(const Json& result, Progress::Style style) {
+        if (!m_directory) return;
+        m_recorder->finish(result);
+        if (m_page) writeText(m_directory->folder() / "view.html", m_page->html());
+        if (m_pictures) {
+            Progress progress(std::cerr, style, "pictures", m_pictures->count());
+            m_pictures->write(m_directory->folder() / "frames", m_size.width, m_size.height, [&](int drawn) {
+                progress.update(drawn);
+                return interrupted == 0;
+            });
+        }
+        if (!interrupted) m_directory->commit();
+    }
+
+  private:
+    std::optional<OutputDirectory> m_directory;
+    std::optional<Recorder> m_recorder;
+    std::optional<Pictures> m_pictures;
+    std::optional<ViewPage> m_page;
+    Size m_size{};
+};
+
+using AfterFrame = std::function<void(int, const World&)>;
+
+/// Steps to the end, or until there is no sense in going on.
+Profile simulate(World& world, Result& result, Files& files, Progress::Style style, const AfterFrame& afterFrame) {
+    const int frames = world.scene().frames();
+    Progress progress(std::cerr, style, world.scene().name, frames, world.scene().dt);
+    Profile profile;
+    for (int frame = 1; frame <= frames && !interrupted; ++frame) {
+        const FrameReport report = world.step();
+        const double start = wallSeconds();
+        const FrameRecord record = measure(world, frame, report);
+        result.add(record);
+        files.add(record, world);
+        if (afterFrame) afterFrame(frame, world);
+        profile.add(report, world.scene().substeps, wallSeconds() - start);
+        progress.update(frame);
+        if (!record.isStateFinite) break;
+    }
+    return profile;
+}
+
+}  // namespace
+
+double readDuration(const std::string& option, const std::string& text) {
+    const auto seconds = parseFraction(text);
+    if (!seconds || !(*seconds > 0))
+        throw InputError(option + " [s] must be a number > 0 or a fraction such as 1/120, got " + text);
+    return *seconds;
+}
+
+void requireThreads(int threads) {
+    if (threads < 1) throw InputError("--threads must be >= 1, got " + std::to_string(threads));
+    if (threads > 1)
+        throw InputError("--threads " + std::to_string(threads) +
+                         ": this version of Jacket solves with one thread; give 1, or run several scenes at a time "
+                         "(jacket sweep)");
+}
+
+void addOutputOptions(CLI::App& command, RunOutput& output) {
+    command.add_option("--png", output.pictureEvery, "EVERY: a picture every so many frames, in DIR/frames");
+    command.add_option("--size", output.size, "WIDTHxHEIGHT of the pictures; 960x720 if not given");
+    command.add_flag("--html", output.html, "DIR/view.html: the motion in a browser, to be turned by mouse");
+    command.add_flag("--profile", output.profile, "Where the time went: a table, and \"profile\" in result.json");
+    command.add_option("--threads", output.threads, "Threads that solve; 1 is all there is");
+    command.add_flag("--quiet", output.quiet, "No progress; with --out nothing at all");
+}
+
+void checkOutputOptions(const CLI::App& command, const RunOutput& output) {
+    readSize(output.size);
+    if (command.count("--png") && output.pictureEvery < 1)
+        throw InputError("--png must be >= 1 (a picture every so many frames), got " +
+                         std::to_string(output.pictureEvery));
+    if (command.count("--png") && output.out.empty()) throw InputError("--png needs --out DIR to put the pictures in");
+    if (command.count("--size") && !command.count("--png"))
+        throw InputError("--size needs --png: it is the pictures' size");
+    if (output.html && output.out.empty()) throw InputError("--html needs --out DIR to put view.html in");
+    requireThreads(output.threads);
+}
+
+int runScene(const Scene& scene, const RunOutput& output, const AfterFrame& afterFrame) {
+    if (output.profile && scene.isStatic)
+        throw InputError("--profile: a scene of mode \"static\" takes no steps whose time could be split up");
+    World world(scene);
+    Result result(world);
+    Files files(output, world);
+    std::signal(SIGINT, [](int) { interrupted = 1; });
+    std::signal(SIGTERM, [](int) { interrupted = 1; });
+
+    const Progress::Style style = Progress::styleFor(output.quiet);
+    const Profile profile = simulate(world, result, files, style, afterFrame);
+    for (const std::string& warning : world.takeWarnings()) std::cerr << "jacket: note: " << warning << '\n';
+    Json summary = result.json(world);
+    if (output.profile) summary["profile"] = profile.json();
+    files.finish(summary, style);
+    if (interrupted) {
+        std::cerr << "jacket: interrupted" << (output.out.empty() ? "" : "; nothing was written") << '\n';
+        return kInterrupted;
+    }
+    const bool isSilent = !output.out.empty() && output.quiet;
+    if (!isSilent) printSummary(std::cout, summary);
+    if (!isSilent && output.profile) printProfile(std::cout, summary["profile"]);
+    if (!isSilent && !output.out.empty()) std::cout << "  written to        " << output.out << '\n';
+    return result.exitCode();
+}
+
+}  // namespace jacket::demo
