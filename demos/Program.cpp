@@ -16,6 +16,7 @@ constexpr const char* kExamples =
     "  jacket run cloth_sphere --out out/cloth --png 4          the same kind of thing, with files and pictures\n"
     "  jacket run drape --seconds 1 --dt 1/240 --set 'shells.0.mesh.grid.cells=[40,40]'\n"
     "  jacket run my_scene.json --set shells.sheet.material.thickness=2e-3\n"
+    "  jacket bench --sizes 31,101                              milliseconds and strains beside btSoftBody\n"
     "  jacket check hood.obj                                    what is wrong with a mesh\n"
     "  jacket material denim                                    what a preset means\n"
     "  jacket report --quick --out out/report                   which settings are cheapest for an error\n"
@@ -55,6 +56,7 @@ int runProgram(int argc, const char* const* argv) {
     try {
         addListCommand(app, exitCode);
         addRunCommand(app, exitCode);
+        addBenchCommand(app, exitCode);
         addCheckCommand(app, exitCode);
         addMaterialCommand(app, exitCode);
         addReportCommand(app, exitCode);
