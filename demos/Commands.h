@@ -7,6 +7,7 @@ namespace jacket::demo {
 /// Each adds its subcommand; `exitCode` receives what the program returns when that subcommand was given.
 void addListCommand(CLI::App& app, int& exitCode);
 void addRunCommand(CLI::App& app, int& exitCode);
+void addResumeCommand(CLI::App& app, int& exitCode);
 void addBenchCommand(CLI::App& app, int& exitCode);
 void addCheckCommand(CLI::App& app, int& exitCode);
 void addMaterialCommand(CLI::App& app, int& exitCode);

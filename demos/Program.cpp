@@ -16,6 +16,7 @@ constexpr const char* kExamples =
     "  jacket run cloth_sphere --out out/cloth --png 4          the same kind of thing, with files and pictures\n"
     "  jacket run drape --seconds 1 --dt 1/240 --set 'shells.0.mesh.grid.cells=[40,40]'\n"
     "  jacket run my_scene.json --set shells.sheet.material.thickness=2e-3\n"
+    "  jacket resume out/cloth --seconds 8                      the same run, longer\n"
     "  jacket bench --sizes 31,101                              milliseconds and strains beside btSoftBody\n"
     "  jacket check hood.obj                                    what is wrong with a mesh\n"
     "  jacket material denim                                    what a preset means\n"
@@ -56,6 +57,7 @@ int runProgram(int argc, const char* const* argv) {
     try {
         addListCommand(app, exitCode);
         addRunCommand(app, exitCode);
+        addResumeCommand(app, exitCode);
         addBenchCommand(app, exitCode);
         addCheckCommand(app, exitCode);
         addMaterialCommand(app, exitCode);
