@@ -18,6 +18,7 @@ constexpr const char* kExamples =
     "  jacket run my_scene.json --set shells.sheet.material.thickness=2e-3\n"
     "  jacket resume out/cloth --seconds 8                      the same run, longer\n"
     "  jacket bench --sizes 31,101                              milliseconds and strains beside btSoftBody\n"
+    "  jacket sweep plan drape --set shells.0.friction=0.1,0.3 --out out/sweep\n"
     "  jacket check hood.obj                                    what is wrong with a mesh\n"
     "  jacket material denim                                    what a preset means\n"
     "  jacket report --quick --out out/report                   which settings are cheapest for an error\n"
@@ -59,6 +60,7 @@ int runProgram(int argc, const char* const* argv) {
         addRunCommand(app, exitCode);
         addResumeCommand(app, exitCode);
         addBenchCommand(app, exitCode);
+        addSweepCommand(app, exitCode);
         addCheckCommand(app, exitCode);
         addMaterialCommand(app, exitCode);
         addReportCommand(app, exitCode);
