@@ -83,6 +83,7 @@ void Shell::rebuild() {
     m_restLength.resize(static_cast<Eigen::Index>(edges.size()));
     for (std::size_t i = 0; i < edges.size(); ++i)
         m_restLength[i] = (m_rest.col(edges[i].v1) - m_rest.col(edges[i].v0)).norm();
+    m_meanEdge = m_restLength.mean();
     m_assembly = std::make_unique<ShellAssembly>(*this, *m_design);
 }
 

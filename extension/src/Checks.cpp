@@ -30,13 +30,6 @@ std::string nameOf(const ShellBody& shell) {
     return shell.name().empty() ? "a shell without a name" : "shell \"" + shell.name() + "\"";
 }
 
-double meanEdge(const Shell& shell) {
-    double sum = 0.0;
-    for (const auto& e : shell.mesh().edges())
-        sum += (shell.restPositions().col(e.v0) - shell.restPositions().col(e.v1)).norm();
-    return sum / static_cast<double>(shell.mesh().edges().size());
-}
-
 /// Spheres, capsules and the like are all margin.
 bool hasCorners(const btCollisionShape& shape) {
     const int type = shape.getShapeType();
@@ -64,7 +57,7 @@ ShellChecks::Known& ShellChecks::known(const ShellBody& shell) {
     if (!fresh) return entry->second;
     const Points& rest = shell.shell().restPositions();
     entry->second.size = (rest.rowwise().maxCoeff() - rest.rowwise().minCoeff()).norm();
-    if (const double edge = meanEdge(shell.shell()); shell.contactThickness() > edge)
+    if (const double edge = shell.shell().meanEdge(); shell.contactThickness() > edge)
         m_warnings.push_back(nameOf(shell) + ": contact thickness " + millimetres(shell.contactThickness()) +
                              " is larger than the edges (" + millimetres(edge) + " on average)");
     return entry->second;

@@ -22,12 +22,6 @@ bool isCovered(const SurfacePoint& surface, const SurfacePoint& nearer) {
     return !isAbove(surface.point, nearer);
 }
 
-double meanEdge(const HalfEdgeMesh& mesh, const Points& x) {
-    double sum = 0.0;
-    for (const auto& e : mesh.edges()) sum += (x.col(e.v0) - x.col(e.v1)).norm();
-    return sum / static_cast<double>(std::max<std::size_t>(1, mesh.edges().size()));
-}
-
 /// Bounds of a piece, in the world.
 void worldBounds(const ConvexPiece& piece, const Frame& frame, Vec3& lower, Vec3& upper) {
     const Vec3 centre = 0.5 * (piece.lower() + piece.upper()), half = 0.5 * (piece.upper() - piece.lower());
@@ -134,7 +128,7 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
     const double reach = query.vertexReach + query.thickness(), faceReach = query.faceReach + query.thickness();
     // A vertex that has come from the front in this step, or stands no deeper than a triangle is wide, is pushed out.
     double& depth = m_depth[query.pair];
-    if (depth == 0.0) depth = std::max(query.vertexReach, 0.5 * meanEdge(mesh, query.x));
+    if (depth == 0.0) depth = std::max(query.vertexReach, 0.5 * query.shellBody.shell().meanEdge());
     const Points x = (piece.frame.inverse(Eigen::Isometry) * query.frame.inverse(Eigen::Isometry)) * query.x;
     const double margin = std::max({reach, query.wantsFaces() ? faceReach : 0.0, depth});
     Bounds near{x.rowwise().minCoeff().array() - margin, x.rowwise().maxCoeff().array() + margin};

@@ -17,13 +17,6 @@ constexpr double kAtRest = 0.01;     // of the mean edge: a vertex that moves no
 constexpr double kNearlyCalm = 0.9;  // of gDeactivationTime: as far as a body that touches an awake shell gets
 constexpr double kSlow = 0.01;       // a body slower than this wakes no shell that it comes near [m/s]
 
-double meanEdge(const Shell& shell) {
-    double sum = 0.0;
-    for (const auto& e : shell.mesh().edges())
-        sum += (shell.restPositions().col(e.v0) - shell.restPositions().col(e.v1)).norm();
-    return sum / static_cast<double>(shell.mesh().edges().size());
-}
-
 bool samePose(const btTransform& a, const btTransform& b) {
     return (a.getOrigin() - b.getOrigin()).length2() < btScalar(1e-12) &&
            (a.getBasis()[0] - b.getBasis()[0]).length2() + (a.getBasis()[1] - b.getBasis()[1]).length2() <
@@ -174,7 +167,7 @@ bool Sleepers::keepsPlace(ShellBody& shell, double h) const {
     ShellRest& rest = *shell.m_rest;
     if (!shell.options().sleeping) return false;
     const Points& x = shell.shell().positions();
-    const double room = kAtRest * meanEdge(shell.shell());
+    const double room = kAtRest * shell.shell().meanEdge();
     if (rest.place.cols() != x.cols() || (x - rest.place).colwise().squaredNorm().maxCoeff() > room * room) {
         rest.place = x;
         rest.quiet = 0.0;

@@ -95,6 +95,7 @@ class Shell {
     const Points& restPositions() const { return m_rest; }
     const Points& positions() const { return m_x; }           ///< [m]
     const Points& velocities() const { return m_v; }          ///< [m/s]: what the next `advance` moves with
+    double meanEdge() const { return m_meanEdge; }            ///< of the lengths of the edges at rest [m]
     const Eigen::VectorXd& masses() const { return m_mass; }  ///< lumped, [kg]
 
     /// Place and motion; sizes must match (throws std::invalid_argument), values must be finite.
@@ -180,6 +181,7 @@ class Shell {
     double m_lastH = 0.0;     ///< length of that step; 0: there is none [s]
     Eigen::VectorXd m_mass, m_restArea;
     Eigen::VectorXd m_restLength;  ///< of the mesh's edges [m]
+    double m_meanEdge = 0.0;       ///< [m]
     std::vector<char> m_pinned;
     std::vector<Vec3> m_pinTarget;
     std::vector<Mat3> m_freedom;  ///< of guided vertices; empty while there are none
