@@ -15,24 +15,18 @@ constexpr double kMostOffset =
     0.15;                          // of an edge: how far vertices are lifted off a curved body for their chords' sake
 constexpr double kDeep = 0.1;      // of an edge: what is worth another solve where few are made
 constexpr double kMostPush = 0.2;  // of an edge: how far pushOut goes
-constexpr double kOffsetDecay = 0.998;    // a step: a lift that is no longer needed goes away
-constexpr int kFrictionRounds = 4;        // then the lagged friction of the last round stands
-constexpr int kMostFlips = 3;             // a contact that sticks and slides by turns more often is damped instead
-constexpr double kMostFriction = 1.2;     // of what Coulomb allows: more is solved again
-constexpr double kNearEdge = 0.1;         // weight of a triangle's corner below which its contact is an edge's
-constexpr double kSamePoint = 0.15;       // of an edge: how far it may move in a round
-constexpr double kSameContact = 0.3;      // of an edge: how far the point of a face's contact may move in a step
-constexpr double kFrictionChange = 0.02;  // of a contact's friction: less needs no other solve
-constexpr double kMinor = 0.2;            // of the largest friction: what less does is compared with this
+constexpr double kOffsetDecay = 0.998;     // a step: a lift that is no longer needed goes away
+constexpr int kFrictionRounds = 4;         // then the lagged friction of the last round stands
+constexpr int kFrictionRoundsGoingOn = 2;  // the same where few are made and contacts are not new
+constexpr int kMostFlips = 3;              // a contact that sticks and slides by turns more often is damped instead
+constexpr double kMostFriction = 1.2;      // of what Coulomb allows: more is solved again
+constexpr double kNearEdge = 0.1;          // weight of a triangle's corner below which its contact is an edge's
+constexpr double kSamePoint = 0.15;        // of an edge: how far it may move in a round
+constexpr double kSameContact = 0.3;       // of an edge: how far the point of a face's contact may move in a step
+constexpr double kFrictionChange = 0.02;   // of a contact's friction: less needs no other solve
+constexpr double kMinor = 0.2;             // of the largest friction: what less does is compared with this
 constexpr int kFreezeRound = 7;   // from here on normals stay: a triangle that tips to and fro would never settle
 constexpr int kMostChanges = 10;  // a contact that flips more often than this stays as it is
-
-double meanEdge(const Shell& shell) {
-    double sum = 0.0;
-    for (const auto& e : shell.mesh().edges())
-        sum += (shell.restPositions().col(e.v0) - shell.restPositions().col(e.v1)).norm();
-    return sum / static_cast<double>(std::max<std::size_t>(1, shell.mesh().edges().size()));
-}
 
 Mat3 tangential(const Vec3& n) {
     return Mat3::Identity() - n * n.transpose();
@@ -97,6 +91,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     m_index.clear();
     m_deepestGap = 0.0;
     m_frictionRounds = 0;
+    m_mostFrictionRounds = m_memory.empty() ? kFrictionRounds : kFrictionRoundsGoingOn;
     m_anyFast = false;
     m_held.assign(y.cols(), 0);
     m_filterOf.assign(y.cols(), -1);
@@ -105,7 +100,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         for (int i = 0; i < shell.vertexCount(); ++i) m_held[m_offsets[k] + i] = shell.isPinned(i) || shell.isGuided(i);
-        m_edge.push_back(meanEdge(shell));
+        m_edge.push_back(shell.meanEdge());
         shortest = std::min(shortest, m_edge.back());
         speed = std::max(speed, shell.velocities().colwise().norm().maxCoeff());
     }
@@ -495,7 +490,7 @@ bool ContactResponse::updateQuickly(const CoupledSystem& system, const IslandVel
     const bool entered = (round == 0 || isAnyDeep()) && closeFound(solved, round);
     const FrictionChange friction = updateFriction(system, rough);
     const bool slid = friction.share > kMuch || friction.excess > kMuchTooMuch;
-    if (slid && m_frictionRounds == kFrictionRounds)  // at least none pushes by more than Coulomb's limit
+    if (slid && m_frictionRounds == m_mostFrictionRounds)  // at least none pushes by more than Coulomb's limit
         for (Touch& touch : m_touches) touch.slip.speed = std::numeric_limits<double>::infinity();
     return (released || entered || slid) && round + 1 < m_care.rounds;
 }
@@ -551,7 +546,7 @@ bool ContactResponse::releasePulling(int round) {
 
 /// `fresh`: of contacts only that have none yet.
 ContactResponse::FrictionChange ContactResponse::updateFriction(const CoupledSystem& system, bool fresh) {
-    if (!fresh && ++m_frictionRounds > kFrictionRounds) return {};
+    if (!fresh && ++m_frictionRounds > (isQuick() ? m_mostFrictionRounds : kFrictionRounds)) return {};
     double most = 0.0, sum = 0.0, changed = 0.0, excess = 0.0;
     for (const Touch& touch : m_touches) {
         const double limit = touch.contact.friction * touch.normalImpulse;

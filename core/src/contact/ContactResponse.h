@@ -181,7 +181,7 @@ class ContactResponse {
     std::set<int> m_claimed;  ///< vertices of the soft rows that this round has added
     Care m_care = kInFull;
     double m_vertexSlop = 0.0, m_faceSlop = 0.0, m_deepestGap = 0.0;
-    int m_frictionRounds = 0;
+    int m_frictionRounds = 0, m_mostFrictionRounds = 0;
     std::vector<VertexFilter> m_filters;
     std::vector<int> m_filterOf;  ///< per vertex, -1: none
 };
