@@ -85,6 +85,7 @@ struct IslandSolver::Impl {
     bool improves(const IslandInput& input, const Points& before);
     double incrementalPotential(const IslandInput& input, const Points& velocities) const;
     void solveStep(const IslandInput& input, StepReport& report);
+    double linearTolerance(const IslandInput& input) const;
     double floorOfReference(const IslandInput& input) const;
     void solveRounds(const IslandInput& input, StepReport& report);
     void store(const IslandInput& input, StepReport& report);
@@ -392,16 +393,26 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
         const StepSystem& step = input.shells[k]->m_assembly->assemble(
             *input.shells[k], stepOf[k], input.gravity, input.wind, from.middleCols(offsets[k], n),
             y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr);
-        parts.push_back({&step.matrix, &step.rhs, offsets[k]});
+        parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions()});
     }
     std::vector<BodyCoupling> couplings;
     for (const BodyCoupling& c : input.couplings)
         if (dynamicIndex[c.a] >= 0 && dynamicIndex[c.b] >= 0)
             couplings.push_back({dynamicIndex[c.a], dynamicIndex[c.b], c.mass});
+    // Bodies that rest on the solution feel what single precision leaves over: soft rows and stacks lose their balance.
+    const bool isSingle = dynamicBodies.empty() && linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance &&
+                          input.shells[0]->settings().preconditioner == Preconditioner::IncompleteCholesky;
     system.begin(std::move(parts), static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(),
-                 std::move(couplings));
+                 std::move(couplings), isSingle ? Precision::Single : Precision::Double);
     readFreeTwists();
     lap.addTo(times.assembly);
+}
+
+/// Bodies rest on the solution: what the solve leaves over is a force on them.
+double IslandSolver::Impl::linearTolerance(const IslandInput& input) const {
+    double tolerance = input.shells[0]->settings().tolerance;
+    for (const Shell* shell : input.shells) tolerance = std::min(tolerance, shell->settings().tolerance);
+    return (dynamicBodies.empty() ? 1.0 : 0.1) * tolerance;
 }
 
 void IslandSolver::Impl::readFreeTwists() {
@@ -423,13 +434,9 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
     constexpr double kRough = 0.03;  // tolerance of a rough solve
     constexpr double kShare = 0.1;   // which leaves at most this of the residual that it starts with
     const ShellSettings& settings = input.shells[0]->settings();
-    // Bodies rest on the solution: what the solve leaves over is a force on them.
-    double tolerance = (dynamicBodies.empty() ? 1.0 : 0.1) * settings.tolerance;
+    const double tolerance = linearTolerance(input);
     int maxIterations = settings.maxIterations;
-    for (const Shell* shell : input.shells) {
-        tolerance = std::min(tolerance, (dynamicBodies.empty() ? 1.0 : 0.1) * shell->settings().tolerance);
-        maxIterations = std::max(maxIterations, shell->settings().maxIterations);
-    }
+    for (const Shell* shell : input.shells) maxIterations = std::max(maxIterations, shell->settings().maxIterations);
     Points guess = report.solves == 0 ? expected : v;
     Eigen::Matrix<double, 6, Eigen::Dynamic> guessTwist = report.solves == 0 ? freeTwist : u.w;
     u.resize(static_cast<int>(start.cols()), system.bodyCount());
@@ -465,8 +472,7 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         report.pcgIterations += solve.iterations;
         report.residual = solve.residual * std::sqrt(target2 / norm2);
         report.converged = solve.converged;
-        CoupledVector& r = reference;  // its memory is free now
-        system.residual(u, r, unfiltered);
+        unfiltered = pcg.unfilteredResidual();
         if (!u.allFinite() || !unfiltered.allFinite()) return;
         system.velocities(u, v);
         lap.addTo(times.solve);

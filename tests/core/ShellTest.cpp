@@ -145,7 +145,7 @@ void expectSameFromATrain(const Wind* wind) {
         still.step(kStep, kGravity, wind);
         moving.step(kStep, kGravity, wind ? &carried : nullptr);
         const Points back = moving.positions().colwise() - k * kStep * train;
-        ASSERT_LT((back - still.positions()).cwiseAbs().maxCoeff(), 1e-9) << "step " << k;
+        ASSERT_LT((back - still.positions()).cwiseAbs().maxCoeff(), 1e-8) << "step " << k;  // solved in float
     }
 }
 

@@ -740,6 +740,52 @@ TEST(CoupledSystemTest, NewContactsReplaceOldOnes) {
     expectDenseSolution(island.system);
 }
 
+/// Vertices, bodies and rows of every kind, with iterations in single precision: as exact as the tolerance asks, also
+/// beyond what one row of iterations can reach.
+TEST(FilteredPcgTest, SinglePrecisionEqualsDense) {
+    for (const double drag : {0.0, 3.0}) {
+        Island island(42, {13, 8, 40}, 2);
+        makeBusy(island, drag);
+        const DenseVector expected = DenseIsland(island.system).solve();
+        const std::vector<CoupledSystem::ShellPart> parts(island.system.shells().begin(), island.system.shells().end());
+        island.system.begin(parts, island.system.vertexCount(), island.system.mass(), island.system.freeTwist(), {},
+                            Precision::Single);
+        island.finish();
+        for (const double tolerance : {1e-3, 1e-5, 1e-7}) {
+            const Solved solved = solve(island.system, Preconditioner::IncompleteCholesky, tolerance);
+            EXPECT_TRUE(solved.report.converged);
+            EXPECT_LE(solved.report.residual, tolerance);
+            EXPECT_LT(test::relativeError(solved.x(), expected), 10.0 * tolerance);
+        }
+    }
+}
+
+TEST(CoupledSystemTest, SingleOperatorEqualsDouble) {
+    Island island(43, {13, 8}, 2);
+    makeBusy(island, 2.0);
+    const Dense expected = operatorOf(island.system);
+    const std::vector<CoupledSystem::ShellPart> parts(island.system.shells().begin(), island.system.shells().end());
+    island.system.begin(parts, 21, island.system.mass(), island.system.freeTwist(), {}, Precision::Single);
+    island.finish();
+    CoupledVector u;
+    CompactVector x, y;
+    for (CompactVector* vector : {&x, &y}) vector->resize(21, 2);
+    for (int i = 0; i < expected.cols(); ++i) {
+        u.resize(21, 2);
+        (i < 63 ? u.s.reshaped()(i) : u.w.reshaped()(i - 63)) = 1.0;
+        island.system.filter(u);
+        island.system.round(u, x);
+        const std::vector<float> before = x.s;
+        island.system.apply(x, y);
+        EXPECT_EQ(x.s, before);
+        DenseVector column(expected.rows());
+        for (int vertex = 0; vertex < 21; ++vertex)
+            for (int c = 0; c < 3; ++c) column[3 * vertex + c] = y.s[4 * island.system.compactPlaces()[vertex] + c];
+        column.tail(12) = y.w.reshaped();
+        EXPECT_LT((column - expected.col(i)).norm(), 1e-5 * expected.norm()) << "column " << i;
+    }
+}
+
 TEST(FilteredPcgTest, PreconditionersAgree) {
     Island island(23, {40, 30}, 2);
     makeBusy(island, 1.0);

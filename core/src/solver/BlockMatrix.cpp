@@ -3,7 +3,19 @@
 #include <algorithm>
 #include <cassert>
 
+#include "solver/CompactShell.h"
+
 namespace jacket {
+
+BlockMatrix::BlockMatrix() = default;
+BlockMatrix::~BlockMatrix() = default;
+BlockMatrix::BlockMatrix(BlockMatrix&&) noexcept = default;
+BlockMatrix& BlockMatrix::operator=(BlockMatrix&&) noexcept = default;
+
+CompactShell& BlockMatrix::compact() const {
+    if (!m_compact) m_compact = std::make_unique<CompactShell>(*this);
+    return *m_compact;
+}
 
 void BlockMatrix::setPattern(int size, std::vector<std::pair<int, int>> pairs) {
     for (auto& [row, column] : pairs)
@@ -22,6 +34,7 @@ void BlockMatrix::setPattern(int size, std::vector<std::pair<int, int>> pairs) {
     for (int i = 0; i < size; ++i) m_rowStart[i + 1] += m_rowStart[i];
     m_diagonal.assign(size, Mat3::Zero());
     m_lower.assign(pairs.size(), Mat3::Zero());
+    m_compact.reset();
 }
 
 int BlockMatrix::slot(int row, int column) const {

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/SparseCore>
 
+#include <memory>
 #include <span>
 #include <utility>
 #include <vector>
@@ -12,10 +13,17 @@ namespace jacket {
 /// A symmetric matrix of one scalar per vertex pair, which stands for that scalar times I3.
 using ConstantHessian = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
+struct CompactShell;
+
 /// Symmetric matrix of 3x3 blocks with a fixed pattern: the diagonal, and the blocks strictly below it by rows. Scalars
 /// times I3 outside the pattern may stand beside it.
 class BlockMatrix {
   public:
+    BlockMatrix();
+    ~BlockMatrix();
+    BlockMatrix(BlockMatrix&&) noexcept;
+    BlockMatrix& operator=(BlockMatrix&&) noexcept;
+
     /// `pairs`: vertex pairs that share a block, in any order and as often as they come. Values become zero.
     void setPattern(int size, std::vector<std::pair<int, int>> pairs);
     /// Index of block (row, column) in lower(), row > column. The pair must be in the pattern.
@@ -32,7 +40,8 @@ class BlockMatrix {
     int rowEnd(int row) const { return m_rowStart[row + 1]; }
     int column(int k) const { return m_column[k]; }
 
-    /// From now on the matrix has `factor` times `scalars` beside its blocks. They must outlive it; null: nothing.
+    /// From now on the matrix has `factor` times `scalars` beside its blocks. They must outlive it
+    /// and never change; null: nothing.
     void setBeside(const ConstantHessian* scalars, double factor) {
         m_beside = scalars;
         m_besideFactor = factor;
@@ -43,12 +52,17 @@ class BlockMatrix {
     /// y = A x over `size()` columns starting at x and y (3 doubles each). They must not overlap.
     void multiply(const double* x, double* y) const;
 
+    /// Place for the copy in single precision that solves work with, and what they keep of it. Made with the pattern
+    /// alone when first asked for; its values are whatever the last solve gave it.
+    CompactShell& compact() const;
+
   private:
     void addBeside(const double* x, double* y) const;
     std::vector<int> m_rowStart, m_column;
     std::vector<Mat3> m_diagonal, m_lower;
     const ConstantHessian* m_beside = nullptr;
     double m_besideFactor = 0.0;
+    mutable std::unique_ptr<CompactShell> m_compact;
 };
 
 }  // namespace jacket

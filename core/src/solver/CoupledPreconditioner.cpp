@@ -4,8 +4,12 @@
 #include <algorithm>
 #include <numeric>
 
+#include "solver/CompactShell.h"
+
 namespace jacket {
 namespace {
+
+constexpr int kLeastForCoarse = 1000;  ///< vertices from which on a coarse space pays
 
 /// For every body the first body of its group.
 std::vector<int> groupLeaders(const CoupledSystem& system) {
@@ -21,10 +25,10 @@ std::vector<int> groupLeaders(const CoupledSystem& system) {
 }  // namespace
 
 void CoupledPreconditioner::build(const CoupledSystem& system, Preconditioner kind) {
-    m_kind = kind;
+    m_kind = system.precision() == Precision::Single ? Preconditioner::IncompleteCholesky : kind;
     m_factors.resize(system.shells().size());
     m_inverseBlocks.resize(system.shells().size());
-    for (std::size_t i = 0; i < system.shells().size(); ++i) buildShell(system, i, kind);
+    for (std::size_t i = 0; i < system.shells().size(); ++i) buildShell(system, i, m_kind);
     updateBodies(system);
 }
 
@@ -37,12 +41,36 @@ void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t 
         m_lower.clear();
     addRows(system, part);
     filterBlocks(system, part);
+    if (system.precision() == Precision::Single) {
+        part.matrix->compact().factor.factor(m_diagonal, m_lower);
+        buildCoarse(system, part);
+        return;
+    }
     if (kind == Preconditioner::IncompleteCholesky) {
         m_factors[shell].factor(*part.matrix, m_diagonal, m_lower);
     } else {
         m_inverseBlocks[shell].resize(m_diagonal.size());
         for (std::size_t i = 0; i < m_diagonal.size(); ++i) m_inverseBlocks[shell][i] = m_diagonal[i].inverse();
     }
+}
+
+void CoupledPreconditioner::buildCoarse(const CoupledSystem& system, const CoupledSystem::ShellPart& part) {
+    CompactShell& compact = part.matrix->compact();
+    if (part.matrix->size() < kLeastForCoarse || !part.positions) return compact.coarse.reset();
+    if (!compact.coarse) compact.coarse = std::make_unique<CoarseSpace>(compact.matrix);
+    const int end = part.offset + part.matrix->size();
+    const std::vector<int>& rowOf = compact.matrix.rowOf();
+    m_free.assign(part.matrix->size(), nullptr);
+    for (const auto& c : system.constraints())
+        if (c.vertex >= part.offset && c.vertex < end) m_free[rowOf[c.vertex - part.offset]] = &c.free;
+    m_ties.clear();
+    for (const auto& row : system.rows()) {
+        if (row.vertices[0] < part.offset || row.vertices[0] >= end) continue;
+        CoarseSpace::Tie tie{.rows = {}, .weights = row.weights, .stiffness = row.stiffness};
+        for (int a = 0; a < 3; ++a) tie.rows[a] = rowOf[row.vertices[a] - part.offset];
+        m_ties.push_back(tie);
+    }
+    compact.coarse->build(compact.matrix, *part.positions, m_free, m_ties);
 }
 
 void CoupledPreconditioner::addRows(const CoupledSystem& system, const CoupledSystem::ShellPart& part) {
@@ -137,14 +165,31 @@ void CoupledPreconditioner::apply(const CoupledSystem& system, const CoupledVect
                 z.s.col(k + part.offset).noalias() = m_inverseBlocks[i][k] * r.s.col(k + part.offset);
         }
     }
-    for (std::size_t b = 0; b < m_bodies.size(); ++b) z.w.col(b) = m_bodies[b].solve(r.w.col(b));
+    applyToBodies(r.w, z.w);
+    system.filter(z);
+}
+
+void CoupledPreconditioner::apply(const CoupledSystem& system, const CompactVector& r, CompactVector& z) const {
+    for (const auto& part : system.shells()) {
+        const CompactShell& compact = part.matrix->compact();
+        const float* from = r.s.data() + 4 * static_cast<std::size_t>(part.offset);
+        float* to = z.s.data() + 4 * static_cast<std::size_t>(part.offset);
+        compact.factor.apply(from, to);
+        if (compact.coarse) compact.coarse->addTo(from, to);
+    }
+    applyToBodies(r.w, z.w);
+    system.filter(z);
+}
+
+void CoupledPreconditioner::applyToBodies(const Eigen::Matrix<double, 6, Eigen::Dynamic>& r,
+                                          Eigen::Matrix<double, 6, Eigen::Dynamic>& z) const {
+    for (std::size_t b = 0; b < m_bodies.size(); ++b) z.col(b) = m_bodies[b].solve(r.col(b));
     for (const BodyGroup& group : m_groups) {
         Eigen::VectorXd part(6 * group.bodies.size());
-        for (std::size_t k = 0; k < group.bodies.size(); ++k) part.segment<6>(6 * k) = r.w.col(group.bodies[k]);
+        for (std::size_t k = 0; k < group.bodies.size(); ++k) part.segment<6>(6 * k) = r.col(group.bodies[k]);
         group.factor.solveInPlace(part);
-        for (std::size_t k = 0; k < group.bodies.size(); ++k) z.w.col(group.bodies[k]) = part.segment<6>(6 * k);
+        for (std::size_t k = 0; k < group.bodies.size(); ++k) z.col(group.bodies[k]) = part.segment<6>(6 * k);
     }
-    system.filter(z);
 }
 
 }  // namespace jacket

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "jacket/Shell.h"
+#include "solver/CoarseSpace.h"
 #include "solver/CoupledSystem.h"
 #include "solver/IncompleteCholesky.h"
 
@@ -17,9 +18,15 @@ class CoupledPreconditioner {
     /// the old contacts, filtered by the new, is still positive definite, and cheaper than a new one.
     void updateBodies(const CoupledSystem& system);
     void apply(const CoupledSystem& system, const CoupledVector& r, CoupledVector& z) const;
+    /// The same, of a system in single precision, which is always factored: with an incomplete factor and, where the
+    /// shell is large and its positions are known, a coarse space.
+    void apply(const CoupledSystem& system, const CompactVector& r, CompactVector& z) const;
 
   private:
     void buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind);
+    void buildCoarse(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
+    void applyToBodies(const Eigen::Matrix<double, 6, Eigen::Dynamic>& r,
+                       Eigen::Matrix<double, 6, Eigen::Dynamic>& z) const;
     void addRows(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
     void filterBlocks(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
     void factorGroups(const CoupledSystem& system, const std::vector<Mat6>& blocks);
@@ -31,6 +38,8 @@ class CoupledPreconditioner {
     };
 
     std::vector<Mat3> m_diagonal, m_lower;  ///< scratch: filtered copy of one shell's matrix
+    std::vector<const Mat3*> m_free;        ///< scratch
+    std::vector<CoarseSpace::Tie> m_ties;   ///< scratch
     std::vector<IncompleteCholesky> m_factors;
     std::vector<std::vector<Mat3>> m_inverseBlocks;
     std::vector<Eigen::LDLT<Mat6>> m_bodies;

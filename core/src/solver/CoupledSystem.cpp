@@ -2,10 +2,17 @@
 
 #include <cassert>
 
+#include "solver/CompactShell.h"
+
 namespace jacket {
 
 void CoupledVector::resize(int vertices, int bodies) {
     s.setZero(3, vertices);
+    w.setZero(6, bodies);
+}
+
+void CompactVector::resize(int vertices, int bodies) {
+    s.assign(4 * static_cast<std::size_t>(vertices), 0.0f);
     w.setZero(6, bodies);
 }
 
@@ -24,7 +31,7 @@ Mat6 pointStiffness(const Mat3& k, const Vec3& arm) {
 }
 
 void CoupledSystem::begin(std::vector<ShellPart> shells, int vertexCount, std::vector<Mat6> mass,
-                          std::vector<Vec6> freeTwist, std::vector<BodyCoupling> couplings) {
+                          std::vector<Vec6> freeTwist, std::vector<BodyCoupling> couplings, Precision precision) {
     m_shells = std::move(shells);
     m_vertexCount = vertexCount;
     m_mass = std::move(mass);
@@ -35,6 +42,15 @@ void CoupledSystem::begin(std::vector<ShellPart> shells, int vertexCount, std::v
     m_constraintOf.assign(vertexCount, -1);
     m_constraints.clear();
     m_rows.clear();
+    m_precision = precision;
+    if (precision == Precision::Double) return;
+    m_compactPlaces.resize(vertexCount);
+    for (const auto& shell : m_shells) {
+        CompactShell& compact = shell.matrix->compact();
+        if (compact.matrix.setValues(*shell.matrix)) compact.coarse.reset();
+        for (int i = 0; i < shell.matrix->size(); ++i)
+            m_compactPlaces[shell.offset + i] = shell.offset + compact.matrix.rowOf()[i];
+    }
 }
 
 void CoupledSystem::setContacts(std::vector<VertexConstraint> constraints, std::vector<SoftRow> rows) {
@@ -113,6 +129,57 @@ void CoupledSystem::apply(const CoupledVector& u, CoupledVector& q) const {
         if (c.body >= 0) q.w.col(c.body) += pointImpulse(c.tie * f, c.arm);
         q.s.col(c.vertex) = c.free * f;
     }
+}
+
+namespace {
+
+Eigen::Map<Eigen::Vector3f> at(std::vector<float>& s, int place) {
+    return Eigen::Map<Eigen::Vector3f>(s.data() + 4 * static_cast<std::size_t>(place));
+}
+
+}  // namespace
+
+void CoupledSystem::apply(CompactVector& u, CompactVector& q) const {
+    m_saved.clear();
+    for (const auto& c : m_constraints) {
+        if (c.body < 0) continue;
+        auto v = at(u.s, m_compactPlaces[c.vertex]);
+        m_saved.push_back(v);
+        v += (c.tie * pointVelocity(u.w.col(c.body), c.arm)).cast<float>();
+    }
+    for (const auto& shell : m_shells)
+        shell.matrix->compact().matrix.multiply(u.s.data() + 4 * shell.offset, q.s.data() + 4 * shell.offset);
+    momentum(u.w, q.w);
+    for (const auto& row : m_rows) {
+        Vec3 velocity = Vec3::Zero();
+        for (int a = 0; a < 3; ++a)
+            velocity += row.weights[a] * at(u.s, m_compactPlaces[row.vertices[a]]).cast<double>();
+        if (row.body >= 0) velocity -= pointVelocity(u.w.col(row.body), row.arm);
+        const Vec3 f = row.stiffness * velocity;
+        for (int a = 0; a < 3; ++a) at(q.s, m_compactPlaces[row.vertices[a]]) += (row.weights[a] * f).cast<float>();
+        if (row.body >= 0) q.w.col(row.body) -= pointImpulse(f, row.arm);
+    }
+    std::size_t saved = 0;
+    for (const auto& c : m_constraints) {
+        auto force = at(q.s, m_compactPlaces[c.vertex]);
+        const Vec3 f = force.cast<double>();
+        force = (c.free * f).cast<float>();
+        if (c.body < 0) continue;
+        q.w.col(c.body) += pointImpulse(c.tie * f, c.arm);
+        at(u.s, m_compactPlaces[c.vertex]) = m_saved[saved++];
+    }
+}
+
+void CoupledSystem::filter(CompactVector& u) const {
+    for (const auto& c : m_constraints) {
+        auto v = at(u.s, m_compactPlaces[c.vertex]);
+        v = (c.free * v.cast<double>()).cast<float>();
+    }
+}
+
+void CoupledSystem::round(const CoupledVector& u, CompactVector& result) const {
+    for (int i = 0; i < m_vertexCount; ++i) at(result.s, m_compactPlaces[i]) = u.s.col(i).cast<float>();
+    result.w = u.w;
 }
 
 void CoupledSystem::residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered) const {

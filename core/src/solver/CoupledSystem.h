@@ -21,6 +21,18 @@ struct CoupledVector {
     bool allFinite() const { return s.allFinite() && w.allFinite(); }
 };
 
+/// The same in single precision but for the twists: four floats a vertex, the last of them 0, in the order of the
+/// shells' compact matrices.
+struct CompactVector {
+    std::vector<float> s;
+    Eigen::Matrix<double, 6, Eigen::Dynamic> w;
+
+    void resize(int vertices, int bodies);
+};
+
+/// What the iterations of a solve compute with. Residuals, and so what bodies feel, are double in any case.
+enum class Precision { Double, Single };
+
 /// The modified filter of one vertex (Ascher & Boxerman 2003), relative to what it touches:
 /// v = s + T (G w_b + carried), S s free, (I - S) s = z. T is I where the vertex moves with the body, and I - S where
 /// it slides over it: only in the constrained directions are its velocities then relative to the body, or a light body
@@ -67,12 +79,13 @@ class CoupledSystem {
     struct ShellPart {
         const BlockMatrix* matrix;
         const Points* rhs;
-        int offset;  ///< first vertex in the island's numbering
+        int offset;                         ///< first vertex in the island's numbering
+        const Points* positions = nullptr;  ///< for a coarse space; null: without
     };
 
     /// `couplings`: off-diagonal blocks of the mass, between dynamic bodies by their index here.
     void begin(std::vector<ShellPart> shells, int vertexCount, std::vector<Mat6> mass, std::vector<Vec6> freeTwist,
-               std::vector<BodyCoupling> couplings = {});
+               std::vector<BodyCoupling> couplings = {}, Precision precision = Precision::Double);
     /// Replaces the bodies' own masses and free twists.
     void setBodies(const std::vector<Mat6>& mass, const std::vector<Vec6>& freeTwist) {
         m_mass = mass;
@@ -87,6 +100,9 @@ class CoupledSystem {
     const VertexConstraint* constraintOf(int vertex) const {
         return m_constraintOf[vertex] < 0 ? nullptr : &m_constraints[m_constraintOf[vertex]];
     }
+    Precision precision() const { return m_precision; }
+    /// Place of each vertex in a CompactVector.
+    const std::vector<int>& compactPlaces() const { return m_compactPlaces; }
     int vertexCount() const { return m_vertexCount; }
     int bodyCount() const { return static_cast<int>(m_mass.size()); }
     const std::vector<Mat6>& mass() const { return m_mass; }
@@ -102,6 +118,11 @@ class CoupledSystem {
     void velocities(const CoupledVector& u, Points& v) const;
     /// q = filtered operator applied to u (homogeneous: nothing carried).
     void apply(const CoupledVector& u, CoupledVector& q) const;
+    /// The same in single precision. `u` is changed on the way, and left as it was.
+    void apply(CompactVector& u, CompactVector& q) const;
+    void filter(CompactVector& u) const;
+    /// u rounded.
+    void round(const CoupledVector& u, CompactVector& result) const;
     /// r = filtered right side minus operator at u. `unfiltered` receives (b - A v) of every vertex: minus the
     /// reactions.
     void residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered) const;
@@ -122,6 +143,9 @@ class CoupledSystem {
     std::vector<VertexConstraint> m_constraints;
     std::vector<SoftRow> m_rows;
     std::vector<int> m_constraintOf;
+    Precision m_precision = Precision::Double;
+    std::vector<int> m_compactPlaces;
+    mutable std::vector<Eigen::Vector3f> m_saved;
     mutable Points m_v, m_q;
     mutable Eigen::Matrix<double, 6, Eigen::Dynamic> m_w;
 };

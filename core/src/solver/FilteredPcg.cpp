@@ -1,25 +1,98 @@
 #include "solver/FilteredPcg.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "Kernel.h"
+
 namespace jacket {
+namespace {
+
+using Double4 = double __attribute__((vector_size(32)));
+
+JACKET_KERNEL double dotKernel(std::size_t size, const float* a, const float* b) {
+    Double4 sum{};
+    for (std::size_t i = 0; i < size; i += 4)
+        sum += __builtin_convertvector(load4(a + i), Double4) * __builtin_convertvector(load4(b + i), Double4);
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+/// u += alpha d, r -= alpha q
+JACKET_KERNEL void stepKernel(std::size_t size, double alpha, const float* d, const float* q, double* u, float* r) {
+    const float a = static_cast<float>(alpha);
+    for (std::size_t i = 0; i < size; i += 4) {
+        Double4 next;
+        std::memcpy(&next, u + i, sizeof(next));
+        next += alpha * __builtin_convertvector(load4(d + i), Double4);
+        std::memcpy(u + i, &next, sizeof(next));
+        store4(r + i, load4(r + i) - a * load4(q + i));
+    }
+}
+
+/// d = z + beta d
+JACKET_KERNEL void turnKernel(std::size_t size, float beta, const float* z, float* d) {
+    for (std::size_t i = 0; i < size; i += 4) store4(d + i, load4(z + i) + beta * load4(d + i));
+}
+
+double dot(const CompactVector& a, const CompactVector& b) {
+    return dotKernel(a.s.size(), a.s.data(), b.s.data()) + a.w.cwiseProduct(b.w).sum();
+}
+
+}  // namespace
+
+void FilteredPcg::resize(const CoupledSystem& system) {
+    const int n = system.vertexCount(), bodies = system.bodyCount();
+    const auto fits = [&](const CoupledVector& v) { return v.s.cols() == n && v.w.cols() == bodies; };
+    if (!fits(m_r)) m_r.resize(n, bodies);
+    if (system.precision() == Precision::Double) {
+        for (CoupledVector* v : {&m_z, &m_q})
+            if (!fits(*v)) v->resize(n, bodies);
+        return;
+    }
+    m_change.resize(4 * static_cast<std::size_t>(n));
+    for (CompactVector* v : {&m_compactR, &m_compactZ, &m_compactD, &m_compactQ})
+        if (v->s.size() != m_change.size() || v->w.cols() != bodies) v->resize(n, bodies);
+}
 
 double FilteredPcg::residualNorm2(const CoupledSystem& system, const CoupledPreconditioner& preconditioner,
                                   const CoupledVector& u) {
-    for (CoupledVector* v : {&m_r, &m_z, &m_q})
-        if (v->s.cols() != u.s.cols() || v->w.cols() != u.w.cols()) v->resize(system.vertexCount(), system.bodyCount());
+    resize(system);
     system.residual(u, m_r, m_unfiltered);
-    preconditioner.apply(system, m_r, m_z);
-    return m_r.dot(m_z);
+    if (system.precision() == Precision::Double) {
+        preconditioner.apply(system, m_r, m_z);
+        return m_r.dot(m_z);
+    }
+    system.round(m_r, m_compactR);
+    preconditioner.apply(system, m_compactR, m_compactZ);
+    return dot(m_compactR, m_compactZ);
 }
 
 PcgReport FilteredPcg::solve(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double reference,
                              double tolerance, int maxIterations, CoupledVector& u) {
+    constexpr int kMostStarts = 5;
+    const bool isSingle = system.precision() == Precision::Single;
+    const double target = tolerance * tolerance * reference;
     PcgReport report;
     double rho = residualNorm2(system, preconditioner, u);
-    const double target = tolerance * tolerance * reference;
+    for (int start = 0; start < kMostStarts && !(rho <= target) && report.iterations < maxIterations; ++start) {
+        if (isSingle) {
+            iterateCompact(system, preconditioner, rho, target, maxIterations, report.iterations, u);
+            rho = residualNorm2(system, preconditioner, u);
+            continue;
+        }
+        rho = iterate(system, preconditioner, rho, target, maxIterations, report.iterations, u);
+        system.residual(u, m_r, m_unfiltered);
+        break;
+    }
+    report.converged = rho <= target;
+    report.residual = reference > 0.0 ? std::sqrt(std::max(rho, 0.0) / reference) : 0.0;
+    return report;
+}
+
+double FilteredPcg::iterate(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho,
+                            double target, int maxIterations, int& iterations, CoupledVector& u) {
     m_d = m_z;
-    while (!(rho <= target) && report.iterations < maxIterations) {
+    while (!(rho <= target) && iterations < maxIterations) {
         system.apply(m_d, m_q);
         const double curvature = m_d.dot(m_q);
         if (!(curvature > 0.0)) break;  // lost to rounding, or not finite
@@ -30,11 +103,37 @@ PcgReport FilteredPcg::solve(const CoupledSystem& system, const CoupledPrecondit
         const double next = m_r.dot(m_z);
         m_d.scaleAndAdd(next / rho, m_z);
         rho = next;
-        ++report.iterations;
+        ++iterations;
     }
-    report.converged = rho <= target;
-    report.residual = reference > 0.0 ? std::sqrt(std::max(rho, 0.0) / reference) : 0.0;
-    return report;
+    return rho;
+}
+
+void FilteredPcg::iterateCompact(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho,
+                                 double target, int maxIterations, int& iterations, CoupledVector& u) {
+    constexpr double kMargin = 0.9;  // the residual as the iterations know it is not quite the true one
+    const std::size_t size = m_change.size();
+    CompactVector &r = m_compactR, &z = m_compactZ, &d = m_compactD, &q = m_compactQ;
+    std::fill(m_change.begin(), m_change.end(), 0.0);
+    d.s = z.s;
+    d.w = z.w;
+    while (!(rho <= kMargin * target) && iterations < maxIterations) {
+        system.apply(d, q);
+        const double curvature = dot(d, q);
+        if (!(curvature > 0.0)) break;  // lost to rounding, or not finite
+        const double alpha = rho / curvature;
+        stepKernel(size, alpha, d.s.data(), q.s.data(), m_change.data(), r.s.data());
+        u.w += alpha * d.w;
+        r.w -= alpha * q.w;
+        preconditioner.apply(system, r, z);
+        const double next = dot(r, z);
+        turnKernel(size, static_cast<float>(next / rho), z.s.data(), d.s.data());
+        d.w = z.w + (next / rho) * d.w;
+        rho = next;
+        ++iterations;
+    }
+    const std::vector<int>& place = system.compactPlaces();
+    for (int i = 0; i < system.vertexCount(); ++i)
+        u.s.col(i) += Eigen::Map<const Vec3>(m_change.data() + 4 * static_cast<std::size_t>(place[i]));
 }
 
 }  // namespace jacket

@@ -13,17 +13,29 @@ struct PcgReport {
 /// Modified preconditioned conjugate gradients (Ascher & Boxerman 2003) over vertices and bodies. Memory is kept.
 class FilteredPcg {
   public:
-    /// Improves u, which must satisfy (I - S) s = z, until r^T P^-1 r <= tolerance^2 reference.
+    /// The least tolerance that a system in single precision should be asked for: below, rounding is in the way.
+    static constexpr double kLeastSingleTolerance = 1e-5;
+
+    /// Improves u, which must satisfy (I - S) s = z, until r^T P^-1 r <= tolerance^2 reference. Of a system in single
+    /// precision the iterations are; the residual that they end with is measured in double, and where it is not small
+    /// enough they start again from it.
     PcgReport solve(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double reference,
                     double tolerance, int maxIterations, CoupledVector& u);
     /// r^T P^-1 r at u: what a start costs, and the reference of a solve.
     double residualNorm2(const CoupledSystem& system, const CoupledPreconditioner& preconditioner,
                          const CoupledVector& u);
-    /// (b - A v) at every vertex as of the last call of either.
+    /// (b - A v) at every vertex as of the last call of either: at the u that it left.
     const Points& unfilteredResidual() const { return m_unfiltered; }
 
   private:
+    void resize(const CoupledSystem& system);
+    double iterate(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho, double target,
+                   int maxIterations, int& iterations, CoupledVector& u);
+    void iterateCompact(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho,
+                        double target, int maxIterations, int& iterations, CoupledVector& u);
     CoupledVector m_r, m_z, m_d, m_q;
+    CompactVector m_compactR, m_compactZ, m_compactD, m_compactQ;
+    std::vector<double> m_change;  ///< of u.s, four a vertex as in a CompactVector
     Points m_unfiltered;
 };
 

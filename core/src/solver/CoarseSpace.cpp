@@ -1,0 +1,565 @@
+#include "solver/CoarseSpace.h"
+
+#include <Eigen/OrderingMethods>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "Kernel.h"
+
+namespace jacket {
+namespace {
+
+constexpr int kPatchSize = 64;  ///< vertices
+
+using Double4 = double __attribute__((vector_size(32)));
+
+/// Steps along blocks from `start` to each of `rows`, whose `inside` is set; parts without a way to it come after.
+void measureDistances(const CompactMatrix& matrix, const std::vector<int>& rows, const std::vector<char>& inside,
+                      int start, std::vector<int>& distance, std::vector<int>& queue) {
+    for (const int row : rows) distance[row] = -1;
+    queue.assign(1, start);
+    distance[start] = 0;
+    std::size_t unseen = 0;
+    for (std::size_t done = 0; done < rows.size(); ++done) {
+        if (done == queue.size()) {
+            while (distance[rows[unseen]] >= 0) ++unseen;
+            distance[rows[unseen]] = distance[queue.back()] + 1;
+            queue.push_back(rows[unseen]);
+        }
+        const int row = queue[done];
+        for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) {
+            const int next = matrix.column(k);
+            if (!inside[next] || distance[next] >= 0) continue;
+            distance[next] = distance[row] + 1;
+            queue.push_back(next);
+        }
+    }
+}
+
+/// Patches of about kPatchSize rows: halves of halves, cut across where they are longest.
+std::vector<int> dividePatches(const CompactMatrix& matrix) {
+    struct Part {
+        std::vector<int> rows;
+        int patches;
+    };
+    const int n = matrix.size();
+    std::vector<int> patchOf(n), fromOne(n), fromOther(n), queue;
+    std::vector<char> inside(n);
+    std::vector<Part> open(1);
+    open[0].rows.resize(n);
+    std::iota(open[0].rows.begin(), open[0].rows.end(), 0);
+    open[0].patches = std::max(1, (n + kPatchSize / 2) / kPatchSize);
+    for (int patches = 0; !open.empty();) {
+        Part part = std::move(open.back());
+        open.pop_back();
+        if (part.patches == 1) {
+            for (const int row : part.rows) patchOf[row] = patches;
+            ++patches;
+            continue;
+        }
+        for (const int row : part.rows) inside[row] = 1;
+        measureDistances(matrix, part.rows, inside, part.rows[0], fromOne, queue);
+        const int one = queue.back();
+        measureDistances(matrix, part.rows, inside, one, fromOne, queue);
+        const int other = queue.back();
+        measureDistances(matrix, part.rows, inside, other, fromOther, queue);
+        for (const int row : part.rows) inside[row] = 0;
+        std::stable_sort(part.rows.begin(), part.rows.end(),
+                         [&](int a, int b) { return fromOne[a] - fromOther[a] < fromOne[b] - fromOther[b]; });
+        const int firstPatches = part.patches / 2;
+        const auto cut =
+            part.rows.begin() + static_cast<std::ptrdiff_t>(part.rows.size()) * firstPatches / part.patches;
+        open.push_back({{part.rows.begin(), cut}, firstPatches});
+        open.push_back({{cut, part.rows.end()}, part.patches - firstPatches});
+    }
+    return patchOf;
+}
+
+std::vector<std::vector<int>> patchNeighbours(const CompactMatrix& matrix, const std::vector<int>& patchOf) {
+    const int patches = 1 + *std::max_element(patchOf.begin(), patchOf.end());
+    std::vector<std::vector<int>> neighbours(patches);
+    const auto join = [&](int row, int column) {
+        const int p = patchOf[row], q = patchOf[column];
+        if (p == q) return;
+        for (const auto& [from, to] : {std::pair{p, q}, std::pair{q, p}})
+            if (std::find(neighbours[from].begin(), neighbours[from].end(), to) == neighbours[from].end())
+                neighbours[from].push_back(to);
+    };
+    for (int row = 0; row < matrix.size(); ++row) {
+        for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) join(row, matrix.column(k));
+        for (int k = matrix.besideBegin(row); k < matrix.besideEnd(row); ++k) join(row, matrix.besideColumn(k));
+    }
+    return neighbours;
+}
+
+/// Patches numbered in an order of elimination with little fill.
+std::vector<int> orderPatches(const CompactMatrix& matrix, std::vector<int> patchOf) {
+    const auto neighbours = patchNeighbours(matrix, patchOf);
+    const int size = static_cast<int>(neighbours.size());
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int i = 0; i < size; ++i) {
+        entries.emplace_back(i, i, 1.0);  // the ordering puts rows without a diagonal last, as if they were dense
+        for (const int j : neighbours[i]) entries.emplace_back(i, j, 1.0);
+    }
+    Eigen::SparseMatrix<double> pattern(size, size);
+    pattern.setFromTriplets(entries.begin(), entries.end());
+    Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
+    Eigen::AMDOrdering<int>()(pattern, order);
+    std::vector<int> place(size);
+    for (int k = 0; k < size; ++k) place[order.indices()[k]] = k;
+    for (int& patch : patchOf) patch = place[patch];
+    return patchOf;
+}
+
+/// Inverse of a symmetric positive semi-definite block, without the directions that have (almost) no stiffness left.
+JACKET_INLINE void invertBlock(const double* a, const double* original, double* inverse) {
+    constexpr int m = CoarseFactor::kModes;
+    constexpr double kLeast = 1e-9;  // of what the direction's stiffness was before the elimination
+    double l[m][m], root[m][m];      // root: D^-1/2 L^-1
+    double pivot[m];
+    for (int i = 0; i < m; ++i) {
+        for (int j = 0; j < i; ++j) {
+            double sum = a[m * j + i];
+            for (int k = 0; k < j; ++k) sum -= l[i][k] * l[j][k] * pivot[k];
+            l[i][j] = pivot[j] > 0.0 ? sum / pivot[j] : 0.0;
+        }
+        pivot[i] = a[m * i + i];
+        for (int k = 0; k < i; ++k) pivot[i] -= l[i][k] * l[i][k] * pivot[k];
+        if (!(pivot[i] > kLeast * original[i])) pivot[i] = 0.0;
+    }
+    for (int i = 0; i < m; ++i) {
+        for (int j = 0; j < m; ++j) {
+            root[i][j] = i == j ? 1.0 : 0.0;
+            for (int k = j; k < i; ++k) root[i][j] -= l[i][k] * root[k][j];
+        }
+    }
+    for (int i = 0; i < m; ++i)
+        for (int j = 0; j < m; ++j) {
+            double sum = 0.0;
+            for (int k = std::max(i, j); k < m; ++k)
+                if (pivot[k] > 0.0) sum += root[k][i] * root[k][j] / pivot[k];
+            inverse[m * j + i] = sum;
+        }
+}
+
+struct Elimination {
+    int size;
+    const int *columnStart, *row;
+    double *values, *inverse, *scaled;
+};
+
+/// c = a b
+JACKET_INLINE void multiplyBlocks(const double* a, const double* b, double* c) {
+    constexpr int m = CoarseFactor::kModes;
+    for (int column = 0; column < m; ++column) {
+        double sum[m] = {};
+        for (int k = 0; k < m; ++k)
+            for (int i = 0; i < m; ++i) sum[i] += a[m * k + i] * b[m * column + k];
+        for (int i = 0; i < m; ++i) c[m * column + i] = sum[i];
+    }
+}
+
+/// c -= a b^T
+JACKET_INLINE void subtractTransposed(const double* a, const double* b, double* c) {
+    constexpr int m = CoarseFactor::kModes;
+    for (int column = 0; column < m; ++column) {
+        double sum[m];
+        for (int i = 0; i < m; ++i) sum[i] = c[m * column + i];
+        for (int k = 0; k < m; ++k)
+            for (int i = 0; i < m; ++i) sum[i] -= a[m * k + i] * b[m * k + column];
+        for (int i = 0; i < m; ++i) c[m * column + i] = sum[i];
+    }
+}
+
+JACKET_KERNEL void eliminate(const Elimination& e) {
+    constexpr int m = CoarseFactor::kModes, size = CoarseFactor::kBlock;
+    double* lower = e.values + size * e.size;
+    for (int j = 0; j < e.size; ++j)  // the scaled blocks' memory holds what the pivots are measured against
+        for (int i = 0; i < m; ++i) e.inverse[size * j + i] = e.values[size * j + (m + 1) * i];
+    for (int j = 0; j < e.size; ++j) {
+        double original[m], *inverse = e.inverse + size * j;
+        for (int i = 0; i < m; ++i) original[i] = inverse[i];
+        invertBlock(e.values + size * j, original, inverse);
+        const int begin = e.columnStart[j], end = e.columnStart[j + 1];
+        for (int k = begin; k < end; ++k) multiplyBlocks(lower + size * k, inverse, e.scaled + size * (k - begin));
+        for (int k = begin; k < end; ++k) {
+            const int column = e.row[k];
+            const double* scaled = e.scaled + size * (k - begin);
+            subtractTransposed(lower + size * k, scaled, e.values + size * column);
+            int target = e.columnStart[column];
+            for (int below = k + 1; below < end; ++below) {
+                while (e.row[target] < e.row[below]) ++target;
+                subtractTransposed(lower + size * below, scaled, lower + size * target);
+            }
+        }
+        for (int k = size * begin; k < size * end; ++k) lower[k] = e.scaled[k - size * begin];
+    }
+}
+
+struct Substitution {
+    int size;
+    const int *columnStart, *row;
+    const double *lower, *inverse;
+};
+
+JACKET_KERNEL void substitute(const Substitution& s, double* x) {
+    constexpr int m = CoarseFactor::kModes, size = CoarseFactor::kBlock;
+    for (int j = 0; j < s.size; ++j)
+        for (int k = s.columnStart[j]; k < s.columnStart[j + 1]; ++k) {
+            const double *block = s.lower + size * k, *from = x + m * j;
+            double sum[m] = {}, *to = x + m * s.row[k];
+            for (int c = 0; c < m; ++c)
+                for (int i = 0; i < m; ++i) sum[i] += block[m * c + i] * from[c];
+            for (int i = 0; i < m; ++i) to[i] -= sum[i];
+        }
+    for (int j = s.size - 1; j >= 0; --j) {
+        double sum[m] = {};
+        const double* inverse = s.inverse + size * j;
+        for (int c = 0; c < m; ++c)
+            for (int i = 0; i < m; ++i) sum[i] += inverse[m * c + i] * x[m * j + c];
+        for (int k = s.columnStart[j]; k < s.columnStart[j + 1]; ++k) {
+            const double *block = s.lower + size * k, *from = x + m * s.row[k];
+            for (int i = 0; i < m; ++i)
+                for (int c = 0; c < m; ++c) sum[i] -= block[m * i + c] * from[c];
+        }
+        for (int i = 0; i < m; ++i) x[m * j + i] = sum[i];
+    }
+}
+
+constexpr int kSums = 48, kMoments = 16;  ///< numbers a block: see CoarseSpace::m_sums, m_moments
+
+JACKET_INLINE Float4 cross(Float4 a, Float4 b) {
+    using Order = int __attribute__((vector_size(16)));
+    constexpr Order yzx{1, 2, 0, 3}, zxy{2, 0, 1, 3};
+    return __builtin_shuffle(a, yzx) * __builtin_shuffle(b, zxy) -
+           __builtin_shuffle(a, zxy) * __builtin_shuffle(b, yzx);
+}
+
+/// t += block times the modes' rotations at arm r: e_c x r for c = x, y, z.
+JACKET_INLINE void addRotations(const Float4 (&block)[3], Float4 r, Float4* t) {
+    t[0] += block[2] * r[1] - block[1] * r[2];
+    t[1] += block[0] * r[2] - block[2] * r[0];
+    t[2] += block[1] * r[0] - block[0] * r[1];
+}
+
+/// sums += (modes at arm r)^T t, t of six columns.
+JACKET_INLINE void addModes(Float4 r, const Float4* t, double* sums) {
+    for (int column = 0; column < 6; ++column) {
+        Double4 linear, angular;
+        std::memcpy(&linear, sums + 8 * column, sizeof(linear));
+        std::memcpy(&angular, sums + 8 * column + 4, sizeof(angular));
+        linear += __builtin_convertvector(t[column], Double4);
+        angular += __builtin_convertvector(cross(r, t[column]), Double4);
+        std::memcpy(sums + 8 * column, &linear, sizeof(linear));
+        std::memcpy(sums + 8 * column + 4, &angular, sizeof(angular));
+    }
+}
+
+struct Galerkin {
+    int size;
+    const int *rowStart, *column, *target, *patchOf;
+    const int *besideStart, *besideColumn, *besideTarget;
+    const float *blocks, *rowSums, *beside, *arms;
+    const char *isHeld, *isNearHeld;  ///< see CoarseSpace
+    double *sums, *besideSums;
+    float *moments, *crossSums;
+};
+
+JACKET_KERNEL void addBlocks(const Galerkin& g) {
+    for (int i = 0; i < g.size; ++i) {
+        if (g.isNearHeld[i]) continue;  // see addHeldRow
+        const Float4 ri = load4(g.arms + 4 * i);
+        const float* rowSum = g.rowSums + 9 * i;
+        Float4 own[6] = {load4(rowSum), load4(rowSum + 3), load4(rowSum + 6)};
+        const Float4 sum[3] = {own[0], own[1], own[2]};
+        addRotations(sum, ri, own + 3);
+        for (int k = g.rowStart[i]; k < g.rowStart[i + 1]; ++k) {
+            const float* a = g.blocks + 9 * k;
+            const Float4 block[3] = {load4(a), load4(a + 3), load4(a + 6)};
+            const Float4 rj = load4(g.arms + 4 * g.column[k]);
+            if (g.patchOf[g.column[k]] == g.patchOf[i]) {
+                addRotations(block, rj - ri, own + 3);
+                continue;
+            }
+            const Float4 minus[3] = {-block[0], -block[1], -block[2]};
+            for (int c = 0; c < 3; ++c) own[c] += minus[c];
+            addRotations(minus, ri, own + 3);
+            if (g.target[k] < 0) continue;
+            Float4 other[6] = {block[0], block[1], block[2]};
+            addRotations(block, rj, other + 3);
+            addModes(ri, other, g.sums + kSums * g.target[k]);
+        }
+        addModes(ri, own, g.sums + kSums * g.patchOf[i]);
+    }
+}
+
+/// moments += s (r_i, 1) (r_j, 1)^T
+JACKET_INLINE void addMoment(float s, Float4 ri, Float4 rj, float* moments) {
+    for (int c = 0; c < 4; ++c) store4(moments + 4 * c, load4(moments + 4 * c) + s * ri[c] * rj);
+}
+
+/// Of pairs in different patches: what belongs to the two patches themselves.
+JACKET_INLINE void addCross(const Galerkin& g, float s, int i, int j, int target) {
+    g.besideSums[target] += s;
+    g.besideSums[g.patchOf[i]] -= s;
+    g.besideSums[g.patchOf[j]] -= s;
+    g.crossSums[i] -= s;
+    g.crossSums[j] -= s;
+}
+
+/// Pairs with a held vertex are left out: near it the shell seems stiffer than it is, which harms less than taking the
+/// trouble.
+JACKET_KERNEL void addScalars(const Galerkin& g) {
+    for (int i = 0; i < g.size; ++i) {
+        if (g.isHeld[i]) continue;
+        const Float4 ri = load4(g.arms + 4 * i);
+        for (int k = g.besideStart[i]; k < g.besideStart[i + 1]; ++k) {
+            const int j = g.besideColumn[k], target = g.besideTarget[k];
+            if (g.isHeld[j]) continue;
+            const Float4 rj = load4(g.arms + 4 * j);
+            if (target == g.patchOf[i]) {
+                addMoment(-g.beside[k], rj - ri, rj - ri, g.moments + kMoments * target);
+            } else if (target >= 0) {
+                addMoment(g.beside[k], ri, rj, g.moments + kMoments * target);
+                addCross(g, g.beside[k], i, j, target);
+            } else {
+                addMoment(g.beside[k], rj, ri, g.moments + kMoments * ~target);
+                addCross(g, g.beside[k], i, j, ~target);
+            }
+        }
+    }
+    for (int i = 0; i < g.size; ++i) {
+        const Float4 ri = load4(g.arms + 4 * i);
+        addMoment(g.crossSums[i], ri, ri, g.moments + kMoments * g.patchOf[i]);
+    }
+}
+
+/// P^T A P's part of a row that is held, or next to one that is.
+void addHeldRow(const Galerkin& g, int i, const std::vector<const Mat3*>& free) {
+    using Block = Eigen::Matrix3f;
+    const auto projector = [&](int row) -> Block {
+        return free[row] ? Block(free[row]->cast<float>()) : Block::Identity();
+    };
+    const auto add = [&](const Block& block, int j, double* sums) {
+        Float4 columns[3], t[6] = {};
+        for (int c = 0; c < 3; ++c) t[c] = columns[c] = Float4{block(0, c), block(1, c), block(2, c), 0.0f};
+        addRotations(columns, load4(g.arms + 4 * j), t + 3);
+        addModes(load4(g.arms + 4 * i), t, sums);
+    };
+    const Block si = projector(i);
+    Block own = Eigen::Map<const Block>(g.rowSums + 9 * i);
+    double* ownSums = g.sums + kSums * g.patchOf[i];
+    for (int k = g.rowStart[i]; k < g.rowStart[i + 1]; ++k) {
+        const Eigen::Map<const Block> block(g.blocks + 9 * k);
+        own -= block;
+        const int j = g.column[k];
+        double* sums = g.patchOf[j] == g.patchOf[i] ? ownSums
+                       : g.target[k] < 0            ? nullptr
+                                                    : g.sums + kSums * g.target[k];
+        if (sums) add(si * block * projector(j), j, sums);
+    }
+    add(si * own * si, i, ownSums);
+}
+
+}  // namespace
+
+CoarseFactor::CoarseFactor(const std::vector<std::vector<int>>& neighbours) : m_columnStart(1, 0) {
+    const int n = static_cast<int>(neighbours.size());
+    std::vector<std::vector<int>> columns(n), children(n);
+    std::vector<int> mark(n, -1);
+    std::size_t longest = 0;
+    for (int j = 0; j < n; ++j) {  // a column has its own blocks and those of the columns that are eliminated into it
+        const auto add = [&](int row) {
+            if (row <= j || mark[row] == j) return;
+            mark[row] = j;
+            columns[j].push_back(row);
+        };
+        for (const int i : neighbours[j]) add(i);
+        for (const int child : children[j])
+            for (const int row : columns[child]) add(row);
+        std::sort(columns[j].begin(), columns[j].end());
+        if (!columns[j].empty()) children[columns[j][0]].push_back(j);
+        m_row.insert(m_row.end(), columns[j].begin(), columns[j].end());
+        m_columnStart.push_back(static_cast<int>(m_row.size()));
+        longest = std::max(longest, columns[j].size());
+    }
+    m_values.assign(static_cast<std::size_t>(kBlock) * blockCount(), 0.0);
+    m_inverse.assign(static_cast<std::size_t>(kBlock) * n, 0.0);
+    m_scaled.assign(kBlock * longest, 0.0);
+}
+
+int CoarseFactor::index(int row, int column) const {
+    if (row <= column) return row == column ? row : -1;
+    const auto begin = m_row.begin() + m_columnStart[column], end = m_row.begin() + m_columnStart[column + 1];
+    return size() + static_cast<int>(std::lower_bound(begin, end, row) - m_row.begin());
+}
+
+void CoarseFactor::factor() {
+    eliminate({size(), m_columnStart.data(), m_row.data(), m_values.data(), m_inverse.data(), m_scaled.data()});
+}
+
+void CoarseFactor::solve(double* x) const {
+    substitute({size(), m_columnStart.data(), m_row.data(), m_values.data() + kBlock * size(), m_inverse.data()}, x);
+}
+
+CoarseSpace::CoarseSpace(const CompactMatrix& matrix)
+    : m_patchOf(orderPatches(matrix, dividePatches(matrix))), m_factor(patchNeighbours(matrix, m_patchOf)) {
+    m_patchStart.assign(patchCount() + 1, 0);
+    for (const int patch : m_patchOf) ++m_patchStart[patch + 1];
+    std::partial_sum(m_patchStart.begin(), m_patchStart.end(), m_patchStart.begin());
+    m_members.resize(matrix.size());
+    std::vector<int> next(m_patchStart.begin(), m_patchStart.end() - 1);
+    for (int row = 0; row < matrix.size(); ++row) m_members[next[m_patchOf[row]]++] = row;
+    m_arms.resize(4 * matrix.size());
+    m_coarse.resize(CoarseFactor::kModes * patchCount());
+    findTargets(matrix);
+}
+
+void CoarseSpace::findTargets(const CompactMatrix& matrix) {
+    for (int row = 0; row < matrix.size(); ++row) {
+        const int p = m_patchOf[row];
+        for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k)
+            m_target.push_back(m_factor.index(p, m_patchOf[matrix.column(k)]));
+        for (int k = matrix.besideBegin(row); k < matrix.besideEnd(row); ++k) {
+            const int q = m_patchOf[matrix.besideColumn(k)];
+            m_besideTarget.push_back(p >= q ? m_factor.index(p, q) : ~m_factor.index(q, p));
+        }
+    }
+}
+
+void CoarseSpace::placeArms(const CompactMatrix& matrix, const Points& positions) {
+    std::vector<Vec3> centre(patchCount(), Vec3::Zero());
+    std::vector<double> size(patchCount(), 0.0);
+    const auto members = [&](int patch) { return std::max(1, m_patchStart[patch + 1] - m_patchStart[patch]); };
+    const std::vector<int>& rowOf = matrix.rowOf();
+    for (int i = 0; i < matrix.size(); ++i) centre[m_patchOf[rowOf[i]]] += positions.col(i);
+    for (int p = 0; p < patchCount(); ++p) centre[p] /= members(p);
+    for (int i = 0; i < matrix.size(); ++i) {
+        const int p = m_patchOf[rowOf[i]];
+        size[p] += (positions.col(i) - centre[p]).squaredNorm();
+    }
+    for (int p = 0; p < patchCount(); ++p) size[p] = std::max(std::sqrt(size[p] / members(p)), 1e-30);
+    for (int i = 0; i < matrix.size(); ++i) {
+        const int p = m_patchOf[rowOf[i]];
+        const Vec3 arm = (positions.col(i) - centre[p]) / size[p];
+        float* to = m_arms.data() + 4 * rowOf[i];
+        for (int c = 0; c < 3; ++c) to[c] = static_cast<float>(arm[c]);
+        to[3] = 1.0f;
+    }
+}
+
+/// The matrices are added up by the kernels in forms of their own; here they become the factor's blocks.
+void CoarseSpace::collect(double besideFactor) {
+    for (int b = 0; b < m_factor.blockCount(); ++b) {
+        Eigen::Map<Mat6> block(m_factor.block(b));
+        const double* sums = m_sums.data() + kSums * b;
+        for (int column = 0; column < 6; ++column)
+            for (int c = 0; c < 3; ++c) {
+                block(c, column) = sums[8 * column + c];
+                block(3 + c, column) = sums[8 * column + 4 + c];
+            }
+        const Eigen::Matrix4d m =
+            besideFactor *
+            Eigen::Map<const Eigen::Matrix4f>(m_moments.data() + kMoments * b).cast<double>().transpose();  // (i, j)
+        block.topLeftCorner<3, 3>().diagonal().array() += besideFactor * m_besideSums[b];
+        block.topRightCorner<3, 3>() -= skew(m.row(3).head<3>().transpose());
+        block.bottomLeftCorner<3, 3>() += skew(m.col(3).head<3>());
+        const Mat3 second = m.topLeftCorner<3, 3>();
+        block.bottomRightCorner<3, 3>() += second.trace() * Mat3::Identity() - second.transpose();
+    }
+}
+
+void CoarseSpace::addTies(const std::vector<const Mat3*>& free, std::span<const Tie> ties) {
+    for (const Tie& tie : ties)
+        for (int a = 0; a < 3; ++a)
+            for (int b = 0; b < 3; ++b) {
+                const int i = tie.rows[a], j = tie.rows[b], target = m_factor.index(m_patchOf[i], m_patchOf[j]);
+                if (target < 0 || tie.weights[a] * tie.weights[b] == 0.0) continue;
+                const auto modes = [&](int row) {
+                    const float* arm = m_arms.data() + 4 * row;
+                    Eigen::Matrix<double, 3, 6> result;
+                    result << Mat3::Identity(), -skew(Vec3(arm[0], arm[1], arm[2]));
+                    return free[row] ? Eigen::Matrix<double, 3, 6>(*free[row] * result) : result;
+                };
+                const Mat3 stiffness = tie.weights[a] * tie.weights[b] * tie.stiffness;
+                Eigen::Map<Mat6>(m_factor.block(target)) += modes(i).transpose() * stiffness * modes(j);
+            }
+}
+
+void CoarseSpace::build(const CompactMatrix& matrix, const Points& positions, const std::vector<const Mat3*>& free,
+                        std::span<const Tie> ties) {
+    placeArms(matrix, positions);
+    m_isHeld.assign(matrix.size(), 0);
+    m_isNearHeld.assign(matrix.size(), 0);
+    for (int row = 0; row < matrix.size(); ++row) {
+        if (!free[row]) continue;
+        m_isHeld[row] = m_isNearHeld[row] = 1;
+        for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) m_isNearHeld[matrix.column(k)] = 1;
+    }
+    m_sums.assign(kSums * m_factor.blockCount(), 0.0);
+    m_moments.assign(kMoments * m_factor.blockCount(), 0.0f);
+    m_besideSums.assign(m_factor.blockCount(), 0.0);
+    m_crossSums.assign(matrix.size(), 0.0f);
+    const auto view = matrix.view();
+    const Galerkin g{matrix.size(),    view.rowStart,       view.column,       m_target.data(),
+                     m_patchOf.data(), view.besideStart,    view.besideColumn, m_besideTarget.data(),
+                     view.blocks,      view.rowSums,        view.beside,       m_arms.data(),
+                     m_isHeld.data(),  m_isNearHeld.data(), m_sums.data(),     m_besideSums.data(),
+                     m_moments.data(), m_crossSums.data()};
+    addBlocks(g);
+    for (int row = 0; row < matrix.size(); ++row)
+        if (m_isNearHeld[row]) addHeldRow(g, row, free);
+    addScalars(g);
+    collect(matrix.besideFactor());
+    addTies(free, ties);
+    m_factor.factor();
+}
+
+namespace {
+
+struct Transfer {
+    int patches;
+    const int *start, *members;
+    const float* arms;
+};
+
+JACKET_KERNEL void restrictTo(const Transfer& t, const float* r, double* coarse) {
+    for (int p = 0; p < t.patches; ++p) {
+        Float4 force{}, torque{};
+        for (int k = t.start[p]; k < t.start[p + 1]; ++k) {
+            const Float4 f = load4(r + 4 * t.members[k]);
+            force += f;
+            torque += cross(load4(t.arms + 4 * t.members[k]), f);
+        }
+        for (int c = 0; c < 3; ++c) {
+            coarse[6 * p + c] = force[c];
+            coarse[6 * p + 3 + c] = torque[c];
+        }
+    }
+}
+
+JACKET_KERNEL void addProlonged(const Transfer& t, const double* coarse, float* z) {
+    for (int p = 0; p < t.patches; ++p) {
+        Float4 linear{}, angular{};
+        for (int c = 0; c < 3; ++c) {
+            linear[c] = static_cast<float>(coarse[6 * p + c]);
+            angular[c] = static_cast<float>(coarse[6 * p + 3 + c]);
+        }
+        for (int k = t.start[p]; k < t.start[p + 1]; ++k) {
+            float* to = z + 4 * t.members[k];
+            store4(to, load4(to) + xyz0(linear + cross(angular, load4(t.arms + 4 * t.members[k]))));
+        }
+    }
+}
+
+}  // namespace
+
+void CoarseSpace::addTo(const float* r, float* z) const {
+    const Transfer transfer{patchCount(), m_patchStart.data(), m_members.data(), m_arms.data()};
+    restrictTo(transfer, r, m_coarse.data());
+    m_factor.solve(m_coarse.data());
+    addProlonged(transfer, m_coarse.data(), z);
+}
+
+}  // namespace jacket

@@ -1,0 +1,77 @@
+#pragma once
+#include <array>
+#include <span>
+#include <vector>
+
+#include "jacket/Types.h"
+#include "solver/CompactMatrix.h"
+
+namespace jacket {
+
+/// Block-sparse factor L D L^T of a symmetric positive semi-definite matrix of 6x6 blocks with a fixed pattern.
+class CoarseFactor {
+  public:
+    static constexpr int kModes = 6, kBlock = kModes * kModes;
+    /// `neighbours`: of each block row, in any order, without itself. Rows are eliminated as they are numbered.
+    explicit CoarseFactor(const std::vector<std::vector<int>>& neighbours);
+    int size() const { return static_cast<int>(m_columnStart.size()) - 1; }
+    int blockCount() const { return size() + static_cast<int>(m_row.size()); }
+    /// Index of block (row, column), row >= column, which must be in the pattern; -1 above the diagonal. Diagonal
+    /// blocks come first.
+    int index(int row, int column) const;
+    /// A block, 36 numbers by columns, to be filled before every `factor`.
+    double* block(int index) { return m_values.data() + kBlock * index; }
+    const double* block(int index) const { return m_values.data() + kBlock * index; }
+    /// In place. Directions without stiffness are left out: the factor's inverse is zero there.
+    void factor();
+    /// x = (L D L^T)^-1 x, six numbers a block row.
+    void solve(double* x) const;
+
+  private:
+    std::vector<int> m_columnStart, m_row;  ///< strictly lower blocks by columns
+    std::vector<double> m_values;           ///< diagonal blocks, then those
+    std::vector<double> m_inverse, m_scaled;
+};
+
+/// The rigid motions of patches of a shell: what a factor without fill does not see. P^T A P is formed for the matrix
+/// and the constraints of a step, with rotations about the vertices' present places, and factored.
+class CoarseSpace {
+  public:
+    /// Takes the pattern, the scalars beside it too, and divides the shell into patches.
+    explicit CoarseSpace(const CompactMatrix& matrix);
+
+    /// A soft row's part: stiffness on the weighted sum of some rows' velocities.
+    struct Tie {
+        std::array<int, 3> rows;
+        Vec3 weights;
+        Mat3 stiffness;
+    };
+    /// `free`: projector of each constrained row, null for all others.
+    void build(const CompactMatrix& matrix, const Points& positions, const std::vector<const Mat3*>& free,
+               std::span<const Tie> ties);
+    /// z += P (P^T A P)^-1 P^T r, four floats a row.
+    void addTo(const float* r, float* z) const;
+    int patchCount() const { return m_factor.size(); }
+    const std::vector<int>& patchOf() const { return m_patchOf; }  ///< of each row
+
+  private:
+    void findTargets(const CompactMatrix& matrix);
+    void placeArms(const CompactMatrix& matrix, const Points& positions);
+    void addTies(const std::vector<const Mat3*>& free, std::span<const Tie> ties);
+    void collect(double besideFactor);
+    std::vector<int> m_patchOf;                ///< of each row; patches are numbered as they are eliminated
+    std::vector<int> m_patchStart, m_members;  ///< rows of each patch
+    CoarseFactor m_factor;
+    std::vector<int> m_target;         ///< factor's block of each block of the matrix; -1: its mirror image has it
+    std::vector<int> m_besideTarget;   ///< of each scalar; ~index where it is the mirror image's
+    std::vector<char> m_isHeld;        ///< rows with a projector
+    std::vector<char> m_isNearHeld;    ///< and those beside them
+    std::vector<float> m_arms;         ///< of each row from its patch' centre over the patch' size, and 1
+    std::vector<double> m_sums;        ///< P^T A P of the blocks: 6 columns of (3, 0, 3, 0) a block
+    std::vector<float> m_moments;      ///< of the scalars: sum s (r_i, 1) (r_j, 1)^T a block
+    std::vector<double> m_besideSums;  ///< the last entry of each moment, which must add up to 0
+    std::vector<float> m_crossSums;    ///< of each row's scalars to other patches
+    mutable std::vector<double> m_coarse;
+};
+
+}  // namespace jacket

@@ -1,0 +1,216 @@
+#include "solver/CompactFactor.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "Kernel.h"
+
+namespace jacket {
+namespace {
+
+using Double4 = double __attribute__((vector_size(32)));
+
+/// What a factor is made of, as plain memory for the kernels. Blocks are nine numbers by columns.
+struct Factoring {
+    int size;
+    const int *vertexOf, *rowStart, *column, *source, *pairStart, *pairs, *upperOf;
+    const double *diagonal, *values;
+    double *inverse, *scaled, *left;
+    float *root, *rootTransposed, *lower, *upper;
+    double shift;
+};
+
+JACKET_INLINE void loadBlock(const double* from, Double4 (&to)[3]) {
+    for (int column = 0; column < 3; ++column)
+        to[column] = Double4{from[3 * column], from[3 * column + 1], from[3 * column + 2], 0.0};
+}
+
+JACKET_INLINE void loadTransposed(const double* from, Double4 (&to)[3]) {
+    for (int column = 0; column < 3; ++column)
+        to[column] = Double4{from[column], from[column + 3], from[column + 6], 0.0};
+}
+
+JACKET_INLINE void storeBlock(const Double4 (&from)[3], double* to) {
+    for (int column = 0; column < 3; ++column) std::memcpy(to + 3 * column, &from[column], 3 * sizeof(double));
+}
+
+/// c -= a b^T of blocks.
+JACKET_INLINE void subtractTransposedProduct(const Double4 (&a)[3], const double* b, Double4 (&c)[3]) {
+    for (int column = 0; column < 3; ++column)
+        c[column] -= a[0] * b[column] + a[1] * b[column + 3] + a[2] * b[column + 6];
+}
+
+/// Of a symmetric 3x3 block L D L^T: l10, l20, l21 of the unit L, and D.
+struct Triangular {
+    double l10, l20, l21, d0, d1, d2;
+};
+
+JACKET_INLINE Triangular triangular(const Double4 (&a)[3]) {
+    Triangular t;
+    t.d0 = a[0][0];
+    t.l10 = a[0][1] / t.d0;
+    t.l20 = a[0][2] / t.d0;
+    t.d1 = a[1][1] - t.l10 * a[0][1];
+    const double s21 = a[1][2] - t.l20 * a[0][1];
+    t.l21 = s21 / t.d1;
+    t.d2 = a[2][2] - t.l20 * a[0][2] - t.l21 * s21;
+    return t;
+}
+
+/// W = D^-1/2 L^-1 of a block, so that its inverse is W^T W: in single precision this keeps the direction in which a
+/// thin shell is soft apart from the others, and is positive whatever rounding does.
+JACKET_INLINE void storeRoot(const Triangular& t, float* root, float* rootTransposed, double* inverse) {
+    const double w0 = 1.0 / std::sqrt(t.d0), w1 = 1.0 / std::sqrt(t.d1), w2 = 1.0 / std::sqrt(t.d2);
+    const double w[9] = {w0, -t.l10 * w1, (t.l10 * t.l21 - t.l20) * w2, 0.0, w1, -t.l21 * w2, 0.0, 0.0, w2};
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            root[3 * j + i] = rootTransposed[3 * i + j] = static_cast<float>(w[3 * j + i]);
+            inverse[3 * j + i] = w[3 * i] * w[3 * j] + w[3 * i + 1] * w[3 * j + 1] + w[3 * i + 2] * w[3 * j + 2];
+        }
+}
+
+/// False where a pivot falls far below what it was in the matrix: the factor has broken down.
+JACKET_KERNEL bool factorKernel(const Factoring& factoring) {
+    constexpr double kLeast = 1e-3;
+    const Factoring f = factoring;  // nobody writes there
+    for (int i = 0; i < f.size; ++i) {
+        Double4 d[3] = {};
+        loadBlock(f.diagonal + 9 * static_cast<std::size_t>(f.vertexOf[i]), d);
+        const Triangular before = triangular(d);
+        for (Double4& column : d) column *= 1.0 + f.shift;
+        for (int k = f.rowStart[i]; k < f.rowStart[i + 1]; ++k) {
+            Double4 block[3] = {}, left[3] = {};
+            if (f.source[k] >= 0)
+                loadBlock(f.values + 9 * static_cast<std::size_t>(f.source[k]), block);
+            else
+                loadTransposed(f.values + 9 * static_cast<std::size_t>(~f.source[k]), block);
+            for (int pair = f.pairStart[k]; pair < f.pairStart[k + 1]; ++pair) {
+                loadBlock(f.left + 9 * f.pairs[2 * pair], left);
+                subtractTransposedProduct(left, f.scaled + 9 * f.pairs[2 * pair + 1], block);
+            }
+            storeBlock(block, f.scaled + 9 * k);
+            const double* inverse = f.inverse + 9 * f.column[k];
+            for (int column = 0; column < 3; ++column)
+                left[column] = block[0] * inverse[3 * column] + block[1] * inverse[3 * column + 1] +
+                               block[2] * inverse[3 * column + 2];
+            storeBlock(left, f.left + 9 * k);
+            subtractTransposedProduct(left, f.scaled + 9 * k, d);
+            float *lower = f.lower + 9 * k, *upper = f.upper + 9 * f.upperOf[k];
+            for (int column = 0; column < 3; ++column)
+                for (int row = 0; row < 3; ++row)
+                    lower[3 * column + row] = upper[3 * row + column] = static_cast<float>(left[column][row]);
+        }
+        const Triangular t = triangular(d);
+        if (!(t.d0 > kLeast * before.d0 && t.d1 > kLeast * before.d1 && t.d2 > kLeast * before.d2)) return false;
+        if (!(t.d0 > 0.0 && t.d1 > 0.0 && t.d2 > 0.0)) return false;
+        storeRoot(t, f.root + 9 * i, f.rootTransposed + 9 * i, f.inverse + 9 * i);
+    }
+    return true;
+}
+
+struct Solving {
+    int size;
+    const int *rowStart, *column, *upperStart, *upperColumn;
+    const float *root, *rootTransposed, *lower, *upper;
+};
+
+JACKET_KERNEL void applyKernel(const Solving& solving, const float* r, float* z) {
+    const Solving f = solving;  // nobody writes there
+    for (int i = 0; i < f.size; ++i) {
+        Float4 sum = load4(r + 4 * i);
+        for (int k = f.rowStart[i]; k < f.rowStart[i + 1]; ++k)
+            sum -= times(f.lower + 9 * k, load4(z + 4 * f.column[k]));
+        store4(z + 4 * i, sum);
+    }
+    for (int i = f.size - 1; i >= 0; --i) {
+        Float4 sum = times(f.rootTransposed + 9 * i, times(f.root + 9 * i, load4(z + 4 * i)));
+        for (int k = f.upperStart[i]; k < f.upperStart[i + 1]; ++k)
+            sum -= times(f.upper + 9 * k, load4(z + 4 * f.upperColumn[k]));
+        store4(z + 4 * i, xyz0(sum));
+    }
+}
+
+}  // namespace
+
+CompactFactor::CompactFactor(const CompactMatrix& matrix)
+    : m_size(matrix.size()), m_vertexOf(matrix.size()), m_rowStart(1, 0), m_upperStart(1, 0) {
+    for (int i = 0; i < m_size; ++i) m_vertexOf[matrix.rowOf()[i]] = i;
+    for (int row = 0; row < m_size; ++row) {
+        for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) {
+            if (matrix.column(k) < row) {
+                m_column.push_back(matrix.column(k));
+                m_source.push_back(matrix.source(k));
+            } else {
+                m_upperColumn.push_back(matrix.column(k));
+            }
+        }
+        m_rowStart.push_back(static_cast<int>(m_column.size()));
+        m_upperStart.push_back(static_cast<int>(m_upperColumn.size()));
+    }
+    std::vector<int> next(m_upperStart.begin(), m_upperStart.end() - 1);
+    m_pairStart.assign(1, 0);
+    for (int row = 0; row < m_size; ++row)
+        for (int k = m_rowStart[row]; k < m_rowStart[row + 1]; ++k) {
+            m_upperOf.push_back(next[m_column[k]]++);
+            int q = m_rowStart[m_column[k]];
+            const int qEnd = m_rowStart[m_column[k] + 1];
+            for (int p = m_rowStart[row]; p < k; ++p) {  // columns that the two rows share
+                while (q < qEnd && m_column[q] < m_column[p]) ++q;
+                if (q < qEnd && m_column[q] == m_column[p]) m_pairs.insert(m_pairs.end(), {p, q});
+            }
+            m_pairStart.push_back(static_cast<int>(m_pairs.size() / 2));
+        }
+    m_inverse.assign(9 * m_size, 0.0);
+    for (auto* perRow : {&m_root, &m_rootTransposed}) perRow->assign(9 * m_size + 3, 0.0f);
+    for (auto* perBlock : {&m_scaled, &m_left}) perBlock->assign(9 * m_column.size(), 0.0);
+    for (auto* perBlock : {&m_lower, &m_upper}) perBlock->assign(9 * m_column.size() + 3, 0.0f);
+}
+
+void CompactFactor::factor(const std::vector<Mat3>& diagonal, const std::vector<Mat3>& lower) {
+    constexpr double kMostShift = 1e3;  // as good as block Jacobi; keeps the loop finite on garbage
+    m_shift *= 0.7;                     // let it shrink again when the breakdown is over
+    if (m_shift < 1e-3) m_shift = 0.0;
+    Factoring f{m_size,
+                m_vertexOf.data(),
+                m_rowStart.data(),
+                m_column.data(),
+                m_source.data(),
+                m_pairStart.data(),
+                m_pairs.data(),
+                m_upperOf.data(),
+                diagonal.data()->data(),
+                lower.empty() ? nullptr : lower.data()->data(),
+                m_inverse.data(),
+                m_scaled.data(),
+                m_left.data(),
+                m_root.data(),
+                m_rootTransposed.data(),
+                m_lower.data(),
+                m_upper.data(),
+                m_shift};
+    while (!factorKernel(f)) {
+        m_shift = std::max(2.0 * m_shift, 5e-3);
+        f.shift = m_shift;
+        if (m_shift > kMostShift) return factorDiagonally(diagonal);
+    }
+}
+
+void CompactFactor::factorDiagonally(const std::vector<Mat3>& diagonal) {
+    for (int row = 0; row < m_size; ++row) {
+        const double mean = std::max(diagonal[m_vertexOf[row]].trace() / 3.0, 1e-30);
+        for (auto* root : {&m_root, &m_rootTransposed})
+            Eigen::Map<Eigen::Matrix3f>(root->data() + 9 * row) =
+                Eigen::Matrix3f::Identity() * static_cast<float>(1.0 / std::sqrt(mean));
+    }
+    std::fill(m_lower.begin(), m_lower.end(), 0.0f);
+    std::fill(m_upper.begin(), m_upper.end(), 0.0f);
+    m_shift = 0.0;
+}
+
+void CompactFactor::apply(const float* r, float* z) const {
+    const Solving f{m_size,        m_rowStart.data(),       m_column.data(), m_upperStart.data(), m_upperColumn.data(),
+                    m_root.data(), m_rootTransposed.data(), m_lower.data(),  m_upper.data()};
+    applyKernel(f, r, z);
+}
+
+}  // namespace jacket

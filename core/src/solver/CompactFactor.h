@@ -1,0 +1,35 @@
+#pragma once
+#include <vector>
+
+#include "solver/CompactMatrix.h"
+
+namespace jacket {
+
+/// IncompleteCholesky in the rows of a CompactMatrix, factored in double and applied in single precision.
+class CompactFactor {
+  public:
+    /// Takes the pattern.
+    explicit CompactFactor(const CompactMatrix& matrix);
+    /// `diagonal` and `lower` are the values, in the order of the block matrix that the pattern came from.
+    void factor(const std::vector<Mat3>& diagonal, const std::vector<Mat3>& lower);
+    /// z = (L D L^T)^-1 r, four floats a row; the last of each is 0 in z. r and z may be the same.
+    void apply(const float* r, float* z) const;
+    double shift() const { return m_shift; }
+
+  private:
+    void factorDiagonally(const std::vector<Mat3>& diagonal);
+    int m_size;
+    std::vector<int> m_vertexOf;  ///< of each row
+    /// Strictly lower blocks by rows: column, and where they come from (see CompactMatrix::source).
+    std::vector<int> m_rowStart, m_column, m_source;
+    /// Block k loses L_p D L_q^T for its pairs (p, q).
+    std::vector<int> m_pairStart, m_pairs;
+    /// Strictly upper blocks of L^T by rows, and the place there of each lower block.
+    std::vector<int> m_upperStart, m_upperColumn, m_upperOf;
+    std::vector<double> m_inverse, m_scaled, m_left;  ///< D^-1, L D, L
+    std::vector<float> m_root, m_rootTransposed;      ///< W and W^T, W^T W = D^-1
+    std::vector<float> m_lower, m_upper;              ///< L, L^T
+    double m_shift = 0.0;
+};
+
+}  // namespace jacket

@@ -1,0 +1,74 @@
+#pragma once
+#include <vector>
+
+#include "solver/BlockMatrix.h"
+
+namespace jacket {
+
+/// A block matrix in single precision, in a numbering of its own, for the products of a solve. What it does to a vector
+/// is written in differences,
+///
+///     y_i = (sum_j A_ij) x_i + sum_j A_ij (x_j - x_i),
+///
+/// with the sum in brackets taken in double precision: a shell that moves as one feels its mass alone, which is many
+/// orders smaller than its stiffness, and no false ground.
+class CompactMatrix {
+  public:
+    /// Takes the pattern; no values yet.
+    explicit CompactMatrix(const BlockMatrix& matrix);
+    /// Takes the values of a matrix with that pattern. What stands beside its blocks is taken once, and again only when
+    /// another matrix of scalars stands there: then it returns true.
+    bool setValues(const BlockMatrix& matrix);
+
+    int size() const { return m_size; }
+    /// Row of each vertex. Neighbours are close to each other (reverse Cuthill-McKee), and rows that do not need one
+    /// another in a triangular solve follow on each other.
+    const std::vector<int>& rowOf() const { return m_rowOf; }
+    /// Blocks of a row: all columns but the row's own, in rising order.
+    int rowBegin(int row) const { return m_rowStart[row]; }
+    int rowEnd(int row) const { return m_rowStart[row + 1]; }
+    int column(int k) const { return m_column[k]; }
+    /// Where block k comes from: a slot of the block matrix, or ~slot of the transposed one.
+    int source(int k) const { return m_source[k]; }
+    /// Scalars beside the blocks: columns before the row's own, without their common factor.
+    int besideBegin(int row) const { return m_besideStart[row]; }
+    int besideEnd(int row) const { return m_besideStart[row + 1]; }
+    int besideColumn(int k) const { return m_besideColumn[k]; }
+    double besideFactor() const { return m_besideFactor; }
+
+    /// All of it as plain memory, for kernels. Blocks are nine floats by columns.
+    struct View {
+        int size;
+        const int *rowStart, *column, *besideStart, *besideColumn;
+        const float *blocks, *rowSums, *beside;  ///< rowSums: sum_j A_ij
+        float besideFactor;
+    };
+    View view() const {
+        return {m_size,
+                m_rowStart.data(),
+                m_column.data(),
+                m_besideStart.data(),
+                m_besideColumn.data(),
+                m_blocks.data(),
+                m_rowSums.data(),
+                m_beside.data(),
+                static_cast<float>(m_besideFactor)};
+    }
+
+    /// y = A x; four floats a row, the last of them 0. They must not overlap.
+    void multiply(const float* x, float* y) const;
+
+  private:
+    void takeBeside(const ConstantHessian* scalars);
+    int m_size;
+    std::vector<int> m_rowOf, m_rowStart, m_column, m_source;
+    std::vector<float> m_blocks, m_rowSums;
+    const ConstantHessian* m_besideSource = nullptr;
+    Eigen::Index m_besideCount = 0;  ///< entries when it was taken
+    std::vector<int> m_besideStart, m_besideColumn;
+    std::vector<float> m_beside;
+    std::vector<double> m_besideSums;  ///< of whole rows
+    double m_besideFactor = 0.0;
+};
+
+}  // namespace jacket
