@@ -11,26 +11,9 @@ namespace {
 constexpr double kNone = -std::numeric_limits<double>::infinity();
 constexpr double kRowPenalty = 10.0;  // penalty of a soft row over the stiffness of its vertices: a round leaves < 1/10
 constexpr double kAlteration = 0.2;   // share of a penetration that a step takes back, and share of an edge at most
-constexpr double kMostOffset =
-    0.15;                          // of an edge: how far vertices are lifted off a curved body for their chords' sake
-constexpr double kDeep = 0.1;      // of an edge: what is worth another solve where few are made
-constexpr double kMostPush = 0.2;  // of an edge: how far pushOut goes
 constexpr double kOffsetDecay = 0.998;     // a step: a lift that is no longer needed goes away
-constexpr int kFrictionRounds = 4;         // then the lagged friction of the last round stands
 constexpr int kFrictionRoundsGoingOn = 2;  // the same where few are made and contacts are not new
-constexpr int kMostFlips = 3;              // a contact that sticks and slides by turns more often is damped instead
-constexpr double kMostFriction = 1.2;      // of what Coulomb allows: more is solved again
-constexpr double kNearEdge = 0.1;          // weight of a triangle's corner below which its contact is an edge's
-constexpr double kSamePoint = 0.15;        // of an edge: how far it may move in a round
 constexpr double kSameContact = 0.3;       // of an edge: how far the point of a face's contact may move in a step
-constexpr double kFrictionChange = 0.02;   // of a contact's friction: less needs no other solve
-constexpr double kMinor = 0.2;             // of the largest friction: what less does is compared with this
-constexpr int kFreezeRound = 7;   // from here on normals stay: a triangle that tips to and fro would never settle
-constexpr int kMostChanges = 10;  // a contact that flips more often than this stays as it is
-
-Mat3 tangential(const Vec3& n) {
-    return Mat3::Identity() - n * n.transpose();
-}
 
 }  // namespace
 
@@ -122,7 +105,10 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     const std::map<int, double> room = roomBesideFaces();
     for (const Contact& contact : m_found) addAtStart(contact, room, y);
     findFast();
-    if (m_anyFast) sweepAtStart();
+    if (m_anyFast) {
+        m_care = kInFull;
+        sweepAtStart();
+    }
     keepEarliest();
 }
 
@@ -214,40 +200,6 @@ void ContactResponse::sweepAtStart() {
         touch.active = true;
         m_touches.push_back(touch);
     }
-}
-
-/// The same for the solved motion, into m_found.
-void ContactResponse::sweepToEnd() {
-    std::vector<const Points*> start, end;
-    for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
-        start.push_back(&m_input.shells[k]->positions());
-        end.push_back(&m_end[k]);
-    }
-    m_found.clear();
-    m_input.contacts->sweep({start, end, m_endTwists, m_fast, m_input.h}, m_found);
-}
-
-bool ContactResponse::passes(const IslandVelocities& solved, const Points& y) {
-    if (!m_input.contacts || !m_anyFast) return false;
-    moveToEnd(solved, y);
-    sweepToEnd();
-    return !m_found.empty();
-}
-
-/// Holds what the solved motion passes first.
-bool ContactResponse::closeFirst(int round) {
-    sweepToEnd();
-    if (m_found.empty()) return false;
-    const auto first = std::min_element(m_found.begin(), m_found.end(),
-                                        [](const Contact& a, const Contact& b) { return a.time < b.time; });
-    const auto [known, fresh] = m_index.try_emplace(keyOf(*first), static_cast<int>(m_touches.size()));
-    if (fresh) m_touches.push_back(makeTouch(*first));
-    Touch& touch = m_touches[known->second];
-    if (touch.active && round >= kFreezeRound) return false;
-    place(touch, *first);
-    touch.active = true;
-    touch.target = -first->gap / m_input.h;  // as close as they were when they touched
-    return true;
 }
 
 /// The first vertices to meet a free body will slow it down, and the others may never come to touch it: held all
@@ -405,23 +357,6 @@ void ContactResponse::finishFilter(VertexFilter& filter, VertexConstraint& const
     rows.push_back(friction);
 }
 
-/// Coulomb's law about the last solve's sliding velocity s, with t = s / |s| and T the tangent plane:
-///     -limit s / |s|  ~  -limit t - limit / |s| (T - t t^T) s
-/// Along t its size is exact whatever the speed; as a damping it would be too large in every step that speeds up.
-void ContactResponse::addFriction(const Touch& touch, Mat3& damping, Vec3& load) const {
-    const Slip& slip = touch.slip;
-    if (!slip.known) return;
-    const Mat3 plane = tangential(touch.contact.normal);
-    if (touch.sticks) {  // a soft row
-        damping += touch.kappa * plane;
-        load += slip.held;
-        return;
-    }
-    const Vec3 t = slip.direction;
-    damping += slip.limit / std::max(slip.speed, slowest()) * (plane - t * t.transpose());
-    load -= slip.limit * t;
-}
-
 double ContactResponse::vertexStiffness(const CoupledSystem& system, const Touch& touch) const {
     const auto& part = system.shells()[touch.contact.shell];
     const Vec3& n = touch.contact.normal;
@@ -542,274 +477,6 @@ bool ContactResponse::releasePulling(int round) {
         }
     }
     return changed && round + 1 < kMaxRounds;
-}
-
-/// `fresh`: of contacts only that have none yet.
-ContactResponse::FrictionChange ContactResponse::updateFriction(const CoupledSystem& system, bool fresh) {
-    if (!fresh && ++m_frictionRounds > (isQuick() ? m_mostFrictionRounds : kFrictionRounds)) return {};
-    double most = 0.0, sum = 0.0, changed = 0.0, excess = 0.0;
-    for (const Touch& touch : m_touches) {
-        const double limit = touch.contact.friction * touch.normalImpulse;
-        most = std::max(most, limit);
-        sum += std::max(limit, 0.0);
-    }
-    bool isWorthIt = false;
-    for (Touch& touch : m_touches) {
-        const double limit = touch.contact.friction * touch.normalImpulse;
-        if (!touch.active || limit <= 0.0 || (fresh && (touch.slip.known || touch.sticks))) continue;
-        const double matters = kFrictionChange * std::max(limit, kMinor * most);
-        const double force = (touch.impulse - touch.normalImpulse * touch.contact.normal).norm();
-        const double change = touch.sticks ? updateSticking(touch, matters, vertexStiffness(system, touch))
-                                           : updateSliding(touch, matters);
-        changed += change;
-        excess += std::max(0.0, force - limit);
-        isWorthIt |= change > matters;
-    }
-    return isWorthIt ? FrictionChange{changed / sum, excess / sum} : FrictionChange{};
-}
-
-/// Where contacts have not settled before the last solve, none may hold a body by more friction than there is: a light
-/// one would be thrown aside.
-void ContactResponse::dropExcessFriction() {
-    for (Touch& touch : m_touches) {
-        const double force = (touch.impulse - touch.normalImpulse * touch.contact.normal).norm();
-        const double limit = touch.contact.friction * std::max(touch.normalImpulse, 0.0);
-        if (!touch.active || force <= kMostFriction * limit) continue;
-        touch.sticks = false;
-        touch.slip = {};
-    }
-}
-
-/// A contact slides once more holds it than friction can. Returns the change of its impulse [N s]; `matters`: what is
-/// worth another solve [N s]; `stiffness`: impulse over velocity of its vertices [kg].
-double ContactResponse::updateSticking(Touch& touch, double matters, double stiffness) const {
-    const double limit = touch.contact.friction * touch.normalImpulse;
-    const Vec3 held = touch.impulse - touch.normalImpulse * touch.contact.normal;
-    const double force = held.norm();
-    if (force <= limit + 0.05 * matters) {
-        touch.slip.held = held;
-        return touch.isRow ? touch.kappa * touch.slide.norm() : 0.0;
-    }
-    touch.sticks = false;
-    ++touch.flips;
-    touch.slip.known = true;
-    touch.slip.limit = limit;
-    touch.slip.direction = -held / force;
-    touch.slip.speed = (force - limit) / stiffness;  // what the excess would give these vertices alone
-    return std::max(limit, force - limit);
-}
-
-/// A contact sticks once friction turns its sliding around.
-double ContactResponse::updateSliding(Touch& touch, double matters) const {
-    const Slip old = touch.slip;
-    Slip& slip = touch.slip;
-    slip.known = true;
-    slip.limit = touch.contact.friction * touch.normalImpulse;
-    slip.speed = touch.slide.norm();
-    const bool turns = old.known && touch.slide.dot(old.direction) <= 0.0;
-    if ((turns || slip.speed < slowest()) && touch.flips < kMostFlips) {
-        touch.sticks = true;
-        slip.held.setZero();
-        ++touch.flips;
-        return slip.limit;
-    }
-    const bool damped = turns || touch.flips >= kMostFlips || slip.speed == 0.0;
-    slip.direction = damped ? Vec3::Zero() : Vec3(touch.slide / slip.speed);
-    if (damped && std::isfinite(old.speed)) slip.speed = std::max(slip.speed, old.speed);
-    const double force = (touch.impulse - touch.normalImpulse * touch.contact.normal).norm();
-    if (force > kMostFriction * slip.limit + matters) return force;  // it slid much faster than was foreseen
-    return (slip.limit * slip.direction - (old.known ? old.limit : 0.0) * old.direction).norm();
-}
-
-void ContactResponse::moveToEnd(const IslandVelocities& solved, const Points& y) {
-    m_end.resize(m_input.shells.size());
-    for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
-        const auto n = m_input.shells[k]->vertexCount();
-        m_end[k] = m_input.shells[k]->positions() + m_input.h * solved.v.middleCols(m_offsets[k], n) +
-                   y.middleCols(m_offsets[k], n);
-    }
-    m_endTwists.resize(m_input.bodies.size());
-    for (std::size_t b = 0; b < m_endTwists.size(); ++b)
-        m_endTwists[b] = m_dynamicIndex[b] < 0 ? m_input.bodies[b].freeTwist : Vec6(solved.w.col(m_dynamicIndex[b]));
-}
-
-/// What is inside a body at the end of the solved motion, the deepest first, into m_found.
-void ContactResponse::findAtEnd(const IslandVelocities& solved, const Points& y) {
-    moveToEnd(solved, y);
-    std::vector<const Points*> positions;
-    for (const Points& end : m_end) positions.push_back(&end);
-    m_found.clear();
-    m_input.contacts->find({positions, m_endTwists, m_input.h}, -m_vertexSlop, -m_faceSlop, m_found);
-    std::sort(m_found.begin(), m_found.end(), [](const Contact& a, const Contact& b) { return a.gap < b.gap; });
-}
-
-bool ContactResponse::checkEnd(const IslandVelocities& solved, const Points& y, int round) {
-    findAtEnd(solved, y);
-    bool changed = closeFound(solved, round);
-    if (m_anyFast) changed |= closeFirst(round);
-    return changed && round + 1 < kMaxRounds;
-}
-
-bool ContactResponse::closeFound(const IslandVelocities& solved, int round) {
-    m_deepestGap = 0.0;
-    m_claimed.clear();
-    bool changed = false;
-    for (const Contact& contact : m_found) changed |= closeAtEnd(contact, solved, round);
-    return changed;
-}
-
-bool ContactResponse::isAnyDeep() const {
-    return std::any_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
-        return missing(contact, touchOf(contact)) < -kDeep * m_edge[contact.shell];
-    });
-}
-
-/// What a contact at the end of the step lacks to where it may be, < 0: it stands deeper [m]. `touch`: the one that it
-/// belongs to, or -1.
-double ContactResponse::missing(const Contact& contact, int touch) const {
-    return touch < 0 ? contact.gap : contact.gap - m_touches[touch].offset - m_touches[touch].allowedGap;
-}
-
-/// The touch that a contact belongs to, -1: none. A point that has moved on to a neighbouring face is still the same.
-int ContactResponse::touchOf(const Contact& contact) const {
-    if (const auto known = m_index.find(keyOf(contact)); known != m_index.end()) return known->second;
-    if (contact.isVertex()) return -1;
-    for (std::size_t i = 0; i < m_touches.size(); ++i) {
-        const Contact& other = m_touches[i].contact;
-        if (m_touches[i].isRow && !other.isVertex() && other.shell == contact.shell && other.body == contact.body &&
-            (other.point - contact.point).norm() < kSamePoint * m_edge[contact.shell])
-            return static_cast<int>(i);
-    }
-    return -1;
-}
-
-bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round) {
-    const int known = touchOf(contact);
-    const bool fresh = known < 0;
-    const bool held = !fresh && m_touches[known].active;
-    const double slop = contact.isVertex() ? m_vertexSlop : m_faceSlop;
-    const double lacks = missing(contact, known);
-    if (lacks > -slop) return false;
-    if (!contact.isVertex() && !held) {
-        // Nearly at a vertex, that says the same; and of features that share vertices the deepest comes first, for the
-        // others may be cured with it.
-        if (contact.weights.maxCoeff() > 1.0 - kNearEdge) return false;
-        m_deepestGap = std::min(m_deepestGap, lacks);
-        if (liftVertices(contact, -lacks, solved)) return true;
-        for (int a = 0; a < 3; ++a)
-            if (contact.weights[a] > 0.0 && m_claimed.count(globalVertex(contact, a))) return true;
-        for (int a = 0; a < 3; ++a)
-            if (contact.weights[a] > 0.0) m_claimed.insert(globalVertex(contact, a));
-    }
-    m_deepestGap = std::min(m_deepestGap, lacks);
-    if (fresh) {
-        m_index[keyOf(contact)] = static_cast<int>(m_touches.size());
-        m_touches.push_back(makeTouch(contact));
-    }
-    Touch& touch = fresh ? m_touches.back() : m_touches[known];
-    if (!touch.active) {
-        if (touch.changes >= kMostChanges) return false;
-        touch.active = true;
-        ++touch.changes;
-    }
-    if (held && round >= kFreezeRound) {
-        touch.target -= 0.7 * lacks / m_input.h;
-        return true;
-    }
-    const bool turned =
-        !fresh && contact.normal.dot(touch.contact.normal) < 0.0;  // it has passed the middle of the body
-    touch.startGap = std::numeric_limits<double>::quiet_NaN();
-    const Vec3 firstNormal = touch.contact.normal;
-    const double firstGap = touch.contact.gap;
-    place(touch, contact);
-    if (turned) {
-        touch.contact.normal = firstNormal;
-        touch.contact.gap = firstGap;
-        touch.target = -std::max(firstGap, 0.0) / m_input.h;
-    } else {
-        touch.target = relativeVelocity(touch, solved).dot(contact.normal) - lacks / m_input.h;
-    }
-    return true;
-}
-
-/// Vertices that lie on a curved surface, or close above it, leave their chords inside it. They are lifted by as much,
-/// once; a row for every chord would only fight them. False when the vertices do not touch the body there: a body
-/// smaller than a triangle.
-bool ContactResponse::liftVertices(const Contact& contact, double by, const IslandVelocities& solved) {
-    const double most = kMostOffset * m_edge[contact.shell];
-    double carried = 0.0;
-    std::array<Touch*, 3> touches{};
-    for (int a = 0; a < 3; ++a) {
-        if (contact.weights[a] == 0.0) continue;
-        Contact vertex = contact;
-        vertex.feature = Feature::vertex(contact.vertices[a]);
-        const auto known = m_index.find(keyOf(vertex));
-        if (known == m_index.end()) continue;
-        Touch& touch = m_touches[known->second];
-        if (touch.contact.normal.dot(contact.normal) < 0.7) continue;
-        if (!touch.active && !isQuick()) continue;
-        const double off = touch.active ? touch.offset : endGap(touch, solved);
-        if (!(off + by <= most) || (!touch.active && touch.changes >= kMostChanges)) continue;
-        touches[a] = &touch;
-        carried += contact.weights[a];
-    }
-    if (carried < 0.6) return false;
-    for (Touch* touch : touches) {
-        if (!touch || touch->lifted >= by) continue;
-        if (!touch->active) {
-            touch->offset = std::max(0.0, endGap(*touch, solved));
-            touch->target = (touch->offset - touch->startGap) / m_input.h;
-            touch->active = true;
-            ++touch->changes;
-        }
-        touch->offset += by - touch->lifted;
-        touch->target += (by - touch->lifted) / m_input.h;
-        touch->lifted = by;
-    }
-    return true;
-}
-
-/// What few rounds have left inside a body is pushed out of it along the normal. A sheet gives way to that nearly for
-/// nothing; a stiff one feels it in the next step.
-void ContactResponse::pushOut(Points& v, std::vector<ContactImpulse>& impulses) {
-    if (!m_input.contacts || !isQuick()) return;
-    std::map<int, Vec3> moved;
-    m_deepestGap = 0.0;
-    for (const Contact& contact : m_found) {
-        const double lacks = missing(contact, touchOf(contact));
-        if (lacks > -(contact.isVertex() ? m_vertexSlop : m_faceSlop)) continue;
-        const double by = std::min(-lacks, kMostPush * m_edge[contact.shell]);
-        m_deepestGap = std::min(m_deepestGap, lacks + by);
-        const Vec3 impulse = push(contact, by, moved);
-        if (impulse.isZero(0.0)) continue;
-        impulses.push_back({contact, impulse, false, Vec3::Zero()});
-        if (contact.isVertex()) m_memory[keyOf(contact)] = {impulse.norm(), 0.0, false, {}, contact.point, true};
-    }
-    for (const auto& [vertex, by] : moved) v.col(vertex) += by / m_input.h;
-}
-
-/// The impulse that moves a contact's point out along its normal, besides what its vertices have been moved by [N s].
-Vec3 ContactResponse::push(const Contact& contact, double by, std::map<int, Vec3>& moved) const {
-    const int corners = contact.isVertex() ? 1 : 3;
-    for (int a = 0; a < corners; ++a)
-        if (contact.weights[a] > 0.0 && m_held[globalVertex(contact, a)]) return Vec3::Zero();
-    const Shell& shell = *m_input.shells[contact.shell];
-    const double damped = 1.0 + m_input.h * shell.material().massDamping;
-    double impulse = 0.0;
-    for (int a = 0; a < corners; ++a) {
-        if (contact.weights[a] == 0.0) continue;
-        Vec3& before = moved.try_emplace(globalVertex(contact, a), Vec3::Zero()).first->second;
-        const double missing = by * contact.weights[a] / contact.weights.squaredNorm() - before.dot(contact.normal);
-        if (missing <= 0.0) continue;
-        before += missing * contact.normal;
-        impulse += shell.masses()[contact.vertices[a]] * damped * missing / m_input.h;
-    }
-    return impulse * contact.normal;
-}
-
-/// How far off the body a contact of the start ends; not a number if it was not seen at the start [m].
-double ContactResponse::endGap(const Touch& touch, const IslandVelocities& solved) const {
-    return touch.startGap + m_input.h * relativeVelocity(touch, solved).dot(touch.contact.normal);
 }
 
 void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {

@@ -113,6 +113,12 @@ class ContactResponse {
         int opposite = -1;  ///< a touch from the other side, by a body of prescribed motion too
     };
 
+    static constexpr int kFrictionRounds = 4;  ///< then the lagged friction of the last round stands
+    static constexpr double kNearEdge = 0.1;   ///< weight of a triangle's corner below which its contact is an edge's
+    static constexpr int kMostChanges = 10;    ///< a contact that flips more often than this stays as it is
+
+    /// Projector on the directions across a normal.
+    static Mat3 tangential(const Vec3& n) { return Mat3::Identity() - n * n.transpose(); }
     Key keyOf(const Contact& c) const;
     const Memory* remembered(const Contact& c) const;
     Touch makeTouch(const Contact& contact) const;

@@ -1,0 +1,243 @@
+#include "contact/ContactResponse.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace jacket {
+namespace {
+
+constexpr double kMostOffset =
+    0.15;                            // of an edge: how far vertices are lifted off a curved body for their chords' sake
+constexpr double kDeep = 0.1;        // of an edge: what is worth another solve where few are made
+constexpr double kMostPush = 0.2;    // of an edge: how far pushOut goes
+constexpr double kSamePoint = 0.15;  // of an edge: how far it may move in a round
+constexpr int kFreezeRound = 7;      // from here on normals stay: a triangle that tips to and fro would never settle
+
+}  // namespace
+
+void ContactResponse::moveToEnd(const IslandVelocities& solved, const Points& y) {
+    m_end.resize(m_input.shells.size());
+    for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
+        const auto n = m_input.shells[k]->vertexCount();
+        m_end[k] = m_input.shells[k]->positions() + m_input.h * solved.v.middleCols(m_offsets[k], n) +
+                   y.middleCols(m_offsets[k], n);
+    }
+    m_endTwists.resize(m_input.bodies.size());
+    for (std::size_t b = 0; b < m_endTwists.size(); ++b)
+        m_endTwists[b] = m_dynamicIndex[b] < 0 ? m_input.bodies[b].freeTwist : Vec6(solved.w.col(m_dynamicIndex[b]));
+}
+
+/// What is inside a body at the end of the solved motion, the deepest first, into m_found.
+void ContactResponse::findAtEnd(const IslandVelocities& solved, const Points& y) {
+    moveToEnd(solved, y);
+    std::vector<const Points*> positions;
+    for (const Points& end : m_end) positions.push_back(&end);
+    m_found.clear();
+    m_input.contacts->find({positions, m_endTwists, m_input.h}, -m_vertexSlop, -m_faceSlop, m_found);
+    std::sort(m_found.begin(), m_found.end(), [](const Contact& a, const Contact& b) { return a.gap < b.gap; });
+}
+
+/// The same for the solved motion, into m_found.
+void ContactResponse::sweepToEnd() {
+    std::vector<const Points*> start, end;
+    for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
+        start.push_back(&m_input.shells[k]->positions());
+        end.push_back(&m_end[k]);
+    }
+    m_found.clear();
+    m_input.contacts->sweep({start, end, m_endTwists, m_fast, m_input.h}, m_found);
+}
+
+bool ContactResponse::passes(const IslandVelocities& solved, const Points& y) {
+    if (!m_input.contacts || !m_anyFast) return false;
+    moveToEnd(solved, y);
+    sweepToEnd();
+    return !m_found.empty();
+}
+
+bool ContactResponse::checkEnd(const IslandVelocities& solved, const Points& y, int round) {
+    findAtEnd(solved, y);
+    bool changed = closeFound(solved, round);
+    if (m_anyFast) changed |= closeFirst(round);
+    return changed && round + 1 < kMaxRounds;
+}
+
+bool ContactResponse::closeFound(const IslandVelocities& solved, int round) {
+    m_deepestGap = 0.0;
+    m_claimed.clear();
+    bool changed = false;
+    for (const Contact& contact : m_found) changed |= closeAtEnd(contact, solved, round);
+    return changed;
+}
+
+/// Holds what the solved motion passes first.
+bool ContactResponse::closeFirst(int round) {
+    sweepToEnd();
+    if (m_found.empty()) return false;
+    const auto first = std::min_element(m_found.begin(), m_found.end(),
+                                        [](const Contact& a, const Contact& b) { return a.time < b.time; });
+    const auto [known, fresh] = m_index.try_emplace(keyOf(*first), static_cast<int>(m_touches.size()));
+    if (fresh) m_touches.push_back(makeTouch(*first));
+    Touch& touch = m_touches[known->second];
+    if (touch.active && round >= kFreezeRound) return false;
+    place(touch, *first);
+    touch.active = true;
+    touch.target = -first->gap / m_input.h;  // as close as they were when they touched
+    return true;
+}
+
+/// What a contact at the end of the step lacks to where it may be, < 0: it stands deeper [m]. `touch`: the one that it
+/// belongs to, or -1.
+double ContactResponse::missing(const Contact& contact, int touch) const {
+    return touch < 0 ? contact.gap : contact.gap - m_touches[touch].offset - m_touches[touch].allowedGap;
+}
+
+bool ContactResponse::isAnyDeep() const {
+    return std::any_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
+        return missing(contact, touchOf(contact)) < -kDeep * m_edge[contact.shell];
+    });
+}
+
+/// The touch that a contact belongs to, -1: none. A point that has moved on to a neighbouring face is still the same.
+int ContactResponse::touchOf(const Contact& contact) const {
+    if (const auto known = m_index.find(keyOf(contact)); known != m_index.end()) return known->second;
+    if (contact.isVertex()) return -1;
+    for (std::size_t i = 0; i < m_touches.size(); ++i) {
+        const Contact& other = m_touches[i].contact;
+        if (m_touches[i].isRow && !other.isVertex() && other.shell == contact.shell && other.body == contact.body &&
+            (other.point - contact.point).norm() < kSamePoint * m_edge[contact.shell])
+            return static_cast<int>(i);
+    }
+    return -1;
+}
+
+bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round) {
+    const int known = touchOf(contact);
+    const bool fresh = known < 0;
+    const bool held = !fresh && m_touches[known].active;
+    const double slop = contact.isVertex() ? m_vertexSlop : m_faceSlop;
+    const double lacks = missing(contact, known);
+    if (lacks > -slop) return false;
+    if (!contact.isVertex() && !held) {
+        // Nearly at a vertex, that says the same; and of features that share vertices the deepest comes first, for the
+        // others may be cured with it.
+        if (contact.weights.maxCoeff() > 1.0 - kNearEdge) return false;
+        m_deepestGap = std::min(m_deepestGap, lacks);
+        if (liftVertices(contact, -lacks, solved)) return true;
+        for (int a = 0; a < 3; ++a)
+            if (contact.weights[a] > 0.0 && m_claimed.count(globalVertex(contact, a))) return true;
+        for (int a = 0; a < 3; ++a)
+            if (contact.weights[a] > 0.0) m_claimed.insert(globalVertex(contact, a));
+    }
+    m_deepestGap = std::min(m_deepestGap, lacks);
+    if (fresh) {
+        m_index[keyOf(contact)] = static_cast<int>(m_touches.size());
+        m_touches.push_back(makeTouch(contact));
+    }
+    Touch& touch = fresh ? m_touches.back() : m_touches[known];
+    if (!touch.active) {
+        if (touch.changes >= kMostChanges) return false;
+        touch.active = true;
+        ++touch.changes;
+    }
+    if (held && round >= kFreezeRound) {
+        touch.target -= 0.7 * lacks / m_input.h;
+        return true;
+    }
+    const bool turned =
+        !fresh && contact.normal.dot(touch.contact.normal) < 0.0;  // it has passed the middle of the body
+    touch.startGap = std::numeric_limits<double>::quiet_NaN();
+    const Vec3 firstNormal = touch.contact.normal;
+    const double firstGap = touch.contact.gap;
+    place(touch, contact);
+    if (turned) {
+        touch.contact.normal = firstNormal;
+        touch.contact.gap = firstGap;
+        touch.target = -std::max(firstGap, 0.0) / m_input.h;
+    } else {
+        touch.target = relativeVelocity(touch, solved).dot(contact.normal) - lacks / m_input.h;
+    }
+    return true;
+}
+
+/// Vertices that lie on a curved surface, or close above it, leave their chords inside it. They are lifted by as much,
+/// once; a row for every chord would only fight them. False when the vertices do not touch the body there: a body
+/// smaller than a triangle.
+bool ContactResponse::liftVertices(const Contact& contact, double by, const IslandVelocities& solved) {
+    const double most = kMostOffset * m_edge[contact.shell];
+    double carried = 0.0;
+    std::array<Touch*, 3> touches{};
+    for (int a = 0; a < 3; ++a) {
+        if (contact.weights[a] == 0.0) continue;
+        Contact vertex = contact;
+        vertex.feature = Feature::vertex(contact.vertices[a]);
+        const auto known = m_index.find(keyOf(vertex));
+        if (known == m_index.end()) continue;
+        Touch& touch = m_touches[known->second];
+        if (touch.contact.normal.dot(contact.normal) < 0.7) continue;
+        if (!touch.active && !isQuick()) continue;
+        const double off = touch.active ? touch.offset : endGap(touch, solved);
+        if (!(off + by <= most) || (!touch.active && touch.changes >= kMostChanges)) continue;
+        touches[a] = &touch;
+        carried += contact.weights[a];
+    }
+    if (carried < 0.6) return false;
+    for (Touch* touch : touches) {
+        if (!touch || touch->lifted >= by) continue;
+        if (!touch->active) {
+            touch->offset = std::max(0.0, endGap(*touch, solved));
+            touch->target = (touch->offset - touch->startGap) / m_input.h;
+            touch->active = true;
+            ++touch->changes;
+        }
+        touch->offset += by - touch->lifted;
+        touch->target += (by - touch->lifted) / m_input.h;
+        touch->lifted = by;
+    }
+    return true;
+}
+
+/// How far off the body a contact of the start ends; not a number if it was not seen at the start [m].
+double ContactResponse::endGap(const Touch& touch, const IslandVelocities& solved) const {
+    return touch.startGap + m_input.h * relativeVelocity(touch, solved).dot(touch.contact.normal);
+}
+
+/// What few rounds have left inside a body is pushed out of it along the normal. A sheet gives way to that nearly for
+/// nothing; a stiff one feels it in the next step.
+void ContactResponse::pushOut(Points& v, std::vector<ContactImpulse>& impulses) {
+    if (!m_input.contacts || !isQuick()) return;
+    std::map<int, Vec3> moved;
+    m_deepestGap = 0.0;
+    for (const Contact& contact : m_found) {
+        const double lacks = missing(contact, touchOf(contact));
+        if (lacks > -(contact.isVertex() ? m_vertexSlop : m_faceSlop)) continue;
+        const double by = std::min(-lacks, kMostPush * m_edge[contact.shell]);
+        m_deepestGap = std::min(m_deepestGap, lacks + by);
+        const Vec3 impulse = push(contact, by, moved);
+        if (impulse.isZero(0.0)) continue;
+        impulses.push_back({contact, impulse, false, Vec3::Zero()});
+        if (contact.isVertex()) m_memory[keyOf(contact)] = {impulse.norm(), 0.0, false, {}, contact.point, true};
+    }
+    for (const auto& [vertex, by] : moved) v.col(vertex) += by / m_input.h;
+}
+
+/// The impulse that moves a contact's point out along its normal, besides what its vertices have been moved by [N s].
+Vec3 ContactResponse::push(const Contact& contact, double by, std::map<int, Vec3>& moved) const {
+    const int corners = contact.isVertex() ? 1 : 3;
+    for (int a = 0; a < corners; ++a)
+        if (contact.weights[a] > 0.0 && m_held[globalVertex(contact, a)]) return Vec3::Zero();
+    const Shell& shell = *m_input.shells[contact.shell];
+    const double damped = 1.0 + m_input.h * shell.material().massDamping;
+    double impulse = 0.0;
+    for (int a = 0; a < corners; ++a) {
+        if (contact.weights[a] == 0.0) continue;
+        Vec3& before = moved.try_emplace(globalVertex(contact, a), Vec3::Zero()).first->second;
+        const double missing = by * contact.weights[a] / contact.weights.squaredNorm() - before.dot(contact.normal);
+        if (missing <= 0.0) continue;
+        before += missing * contact.normal;
+        impulse += shell.masses()[contact.vertices[a]] * damped * missing / m_input.h;
+    }
+    return impulse * contact.normal;
+}
+
+}  // namespace jacket
