@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "Json.h"
 #include "RunProgram.h"
 #include "TemporaryFolder.h"
 
