@@ -372,7 +372,9 @@ double ContactResponse::pinchedMass(const Touch& touch) const {
     if (touch.dynamicBody < 0) return 0.0;
     for (int a = 0; a < 3; ++a) {
         const int vertex = globalVertex(touch.contact, a);
-        if (touch.contact.weights[a] > 0.0 && !m_held[vertex] && m_filterOf[vertex] < 0) return 0.0;
+        const int filter = m_filterOf[vertex];
+        const bool isTaken = filter >= 0 && m_touches[m_filters[filter].touches[0]].dynamicBody != touch.dynamicBody;
+        if (touch.contact.weights[a] > 0.0 && !m_held[vertex] && !isTaken) return 0.0;
     }
     return m_input.bodies[touch.contact.body].mass.diagonal().head<3>().minCoeff();
 }

@@ -6,19 +6,17 @@
 namespace jacket {
 namespace {
 
-/// D of a symmetric 3x3 block L D L^T.
-Vec3 pivots(const Mat3& a) {
-    const double l10 = a(1, 0) / a(0, 0), l20 = a(2, 0) / a(0, 0);
-    const double d1 = a(1, 1) - l10 * a(1, 0), s21 = a(2, 1) - l20 * a(1, 0);
-    return {a(0, 0), d1, a(2, 2) - l20 * a(2, 0) - s21 / d1 * s21};
-}
-
-/// Inverse of a symmetric 3x3 block; false unless it is safely positive definite: a pivot far below what it was
-/// `before`, in the matrix, means that the factor has broken down. A thin shell's block is soft in one direction by
-/// itself.
-bool invertPositive(const Mat3& a, const Mat3& before, Mat3& inverse) {
-    const Vec3 now = pivots(a);
-    if (!((now - 1e-3 * pivots(before)).minCoeff() > 0.0) || !(now.minCoeff() > 0.0)) return false;
+/// Inverse of a symmetric 3x3 block; false unless it is safely positive definite against `scale`.
+bool invertPositive(const Mat3& a, double scale, Mat3& inverse) {
+    const double least = 1e-3 * scale;  // a pivot far below the original diagonal means that the factor has broken down
+    const double d0 = a(0, 0);
+    if (!(d0 > least)) return false;
+    const double l10 = a(1, 0) / d0, l20 = a(2, 0) / d0;
+    const double d1 = a(1, 1) - l10 * a(1, 0);
+    if (!(d1 > least)) return false;
+    const double l21 = (a(2, 1) - l20 * a(1, 0)) / d1;
+    const double d2 = a(2, 2) - l20 * a(2, 0) - l21 * (a(2, 1) - l20 * a(1, 0));
+    if (!(d2 > least)) return false;
     inverse = a.inverse();
     return true;
 }
@@ -47,6 +45,7 @@ bool IncompleteCholesky::tryFactor(const BlockMatrix& matrix, const std::vector<
     }
     for (int i = 0; i < matrix.size(); ++i) {
         Mat3 d = (1.0 + m_shift) * diagonal[i];
+        const double scale = std::min({diagonal[i](0, 0), diagonal[i](1, 1), diagonal[i](2, 2)});
         for (int k = matrix.rowBegin(i); k < matrix.rowEnd(i); ++k) {
             const int j = matrix.column(k);
             Mat3 block = lower[k];
@@ -66,7 +65,7 @@ bool IncompleteCholesky::tryFactor(const BlockMatrix& matrix, const std::vector<
             m_lower[k] = block;
             d.noalias() -= block * (m_inverse[j] * block.transpose());
         }
-        if (!invertPositive(d, diagonal[i], m_inverse[i])) return false;
+        if (!invertPositive(d, scale, m_inverse[i])) return false;
     }
     return true;
 }
