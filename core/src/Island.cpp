@@ -62,7 +62,7 @@ struct IslandSolver::Impl {
     Points lastChange;               ///< dv of the last step
     Points expected;                 ///< velocities if that goes on: the warm start
     Points unfiltered;               ///< (b - A v) at the solution, soft rows included
-    CoupledVector u, reference;
+    CoupledVector u;
     Eigen::Matrix<double, 6, Eigen::Dynamic> freeTwist;
     int lastRounds = 1;                          ///< changes of the contacts in the last step, and one
     mutable Points at;                           ///< where velocities lead one shell
@@ -86,7 +86,7 @@ struct IslandSolver::Impl {
     double incrementalPotential(const IslandInput& input, const Points& velocities) const;
     void solveStep(const IslandInput& input, StepReport& report);
     double linearTolerance(const IslandInput& input) const;
-    double floorOfReference(const IslandInput& input) const;
+    double floorOfReference(const IslandInput& input, double share) const;
     void solveRounds(const IslandInput& input, StepReport& report);
     void store(const IslandInput& input, StepReport& report);
     void pushOut(const IslandInput& input, StepReport& report);
@@ -212,7 +212,7 @@ bool IslandSolver::Impl::improves(const IslandInput& input, const Points& before
             v = 0.5 * (v + before);
         system.start(v, freeTwist, u);
     }
-    double change = 0.0, all = floorOfReference(input);
+    double change = 0.0, all = floorOfReference(input, 0.1);
     for (std::size_t k = 0; k < input.shells.size(); ++k)
         for (int i = 0; i < input.shells[k]->vertexCount(); ++i) {
             const double mass = input.shells[k]->masses()[i];
@@ -420,11 +420,12 @@ void IslandSolver::Impl::readFreeTwists() {
     for (int b = 0; b < freeTwist.cols(); ++b) freeTwist.col(b) = supports.freeTwists()[b];
 }
 
-/// A tenth of what gravity does in a step, so that a scene at rest is not solved to the last bit of nothing.
-double IslandSolver::Impl::floorOfReference(const IslandInput& input) const {
+/// What gravity does in a step, so that a scene at rest is not solved to the last bit of nothing; a tenth of it where
+/// the preconditioner's norm makes little of what is left of it.
+double IslandSolver::Impl::floorOfReference(const IslandInput& input, double share) const {
     double sum = 0.0;
     for (const Shell* shell : input.shells) sum += shell->masses().sum();
-    const double kick = 0.1 * input.h * std::max(input.gravity.norm(), 1e-6);
+    const double kick = share * input.h * std::max(input.gravity.norm(), 1e-6);
     return sum * kick * kick;
 }
 
@@ -440,9 +441,8 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
     Points guess = report.solves == 0 ? expected : v;
     Eigen::Matrix<double, 6, Eigen::Dynamic> guessTwist = report.solves == 0 ? freeTwist : u.w;
     u.resize(static_cast<int>(start.cols()), system.bodyCount());
-    const double floor = floorOfReference(input);
     int freshIterations = -1, lastIterations = 0;  // of the first solve with the present factor, and of the last one
-    double norm2 = floor;                          // what the tolerance is relative to
+    double norm2 = 0.0;                            // what the tolerance is relative to
     bool roughly = response.isQuick() && response.hasContacts() && lastRounds > 1;
     int round = 0;
     for (;;) {
@@ -457,15 +457,15 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         }
         lap.addTo(times.factor);
         if (freshIterations < 0 || !dynamicBodies.empty()) {
-            system.start(start, freeTwist, reference);  // dv = 0
-            norm2 = std::max(pcg.residualNorm2(system, preconditioner, reference), floor);
+            system.start(start, freeTwist, u);  // dv = 0
+            const double floor = floorOfReference(input, preconditioner.isCoarse(system) ? 1.0 : 0.1);
+            norm2 = std::max(pcg.begin(system, preconditioner, u), floor);
         }
         system.start(guess, guessTwist, u);
+        const double rho = pcg.begin(system, preconditioner, u);
         double target2 = tolerance * tolerance * norm2;
-        if (roughly)
-            target2 = std::max(target2, std::min(kRough * kRough * norm2,
-                                                 kShare * kShare * pcg.residualNorm2(system, preconditioner, u)));
-        const PcgReport solve = pcg.solve(system, preconditioner, target2, 1.0, maxIterations, u);
+        if (roughly) target2 = std::max(target2, std::min(kRough * kRough * norm2, kShare * kShare * rho));
+        const PcgReport solve = pcg.finish(system, preconditioner, target2, 1.0, maxIterations, u);
         lastIterations = solve.iterations;
         if (freshIterations < 0) freshIterations = solve.iterations;
         ++report.solves;

@@ -384,7 +384,7 @@ Solved solve(const SheetMatrix& m, Precision precision, double tolerance, bool w
     FilteredPcg pcg;
     CoupledVector u;
     system.start(m.sheet.velocities(), Eigen::Matrix<double, 6, Eigen::Dynamic>(6, 0), u);
-    const double reference = pcg.residualNorm2(system, preconditioner, u);
+    const double reference = pcg.begin(system, preconditioner, u);
     Solved result;
     result.report = pcg.solve(system, preconditioner, reference, tolerance, 3000, u);
     system.velocities(u, result.v);
@@ -425,7 +425,7 @@ TEST(CompactSolveTest, SaysWhenItsBudgetIsSpent) {
     FilteredPcg pcg;
     CoupledVector u;
     system.start(m.sheet.velocities(), Eigen::Matrix<double, 6, Eigen::Dynamic>(6, 0), u);
-    const double reference = pcg.residualNorm2(system, preconditioner, u);
+    const double reference = pcg.begin(system, preconditioner, u);
     const PcgReport report = pcg.solve(system, preconditioner, reference, 1e-5, 2, u);
     EXPECT_EQ(report.iterations, 2);
     EXPECT_FALSE(report.converged);

@@ -518,7 +518,7 @@ Solved solve(const CoupledSystem& system, Preconditioner kind, double tolerance 
     result.u.resize(system.vertexCount(), system.bodyCount());
     const CoupledVector still = result.u;
     system.start(still.s, still.w, result.u);
-    const double reference = pcg.residualNorm2(system, preconditioner, result.u);
+    const double reference = pcg.begin(system, preconditioner, result.u);
     result.report = pcg.solve(system, preconditioner, reference, tolerance, maxIterations, result.u);
     CoupledVector residual = still;
     system.residual(result.u, residual, result.unfiltered);

@@ -9,7 +9,7 @@
 namespace jacket {
 namespace {
 
-constexpr int kLeastForCoarse = 1000;  ///< vertices from which on a coarse space pays
+constexpr int kLeastForCoarse = 300;  ///< vertices from which on a coarse space pays
 
 /// For every body the first body of its group.
 std::vector<int> groupLeaders(const CoupledSystem& system) {
@@ -71,6 +71,12 @@ void CoupledPreconditioner::buildCoarse(const CoupledSystem& system, const Coupl
         m_ties.push_back(tie);
     }
     compact.coarse->build(compact.matrix, *part.positions, m_free, m_ties);
+}
+
+bool CoupledPreconditioner::isCoarse(const CoupledSystem& system) const {
+    return system.precision() == Precision::Single &&
+           std::all_of(system.shells().begin(), system.shells().end(),
+                       [](const auto& part) { return part.matrix->compact().coarse != nullptr; });
 }
 
 void CoupledPreconditioner::addRows(const CoupledSystem& system, const CoupledSystem::ShellPart& part) {

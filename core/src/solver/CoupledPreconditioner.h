@@ -21,6 +21,9 @@ class CoupledPreconditioner {
     /// The same, of a system in single precision, which is always factored: with an incomplete factor and, where the
     /// shell is large and its positions are known, a coarse space.
     void apply(const CoupledSystem& system, const CompactVector& r, CompactVector& z) const;
+    /// Whether every shell has a coarse space: r^T P^-1 r then weighs rigid motions of parts as the others. Without, it
+    /// makes little of them.
+    bool isCoarse(const CoupledSystem& system) const;
 
   private:
     void buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind);

@@ -54,38 +54,42 @@ void FilteredPcg::resize(const CoupledSystem& system) {
         if (v->s.size() != m_change.size() || v->w.cols() != bodies) v->resize(n, bodies);
 }
 
-double FilteredPcg::residualNorm2(const CoupledSystem& system, const CoupledPreconditioner& preconditioner,
-                                  const CoupledVector& u) {
-    resize(system);
-    system.residual(u, m_r, m_unfiltered);
+/// Of m_r, into m_z; returns r^T P^-1 r.
+double FilteredPcg::precondition(const CoupledSystem& system, const CoupledPreconditioner& preconditioner) {
     if (system.precision() == Precision::Double) {
         preconditioner.apply(system, m_r, m_z);
-        return m_r.dot(m_z);
+        return m_rho = m_r.dot(m_z);
     }
     system.round(m_r, m_compactR);
     preconditioner.apply(system, m_compactR, m_compactZ);
-    return dot(m_compactR, m_compactZ);
+    return m_rho = dot(m_compactR, m_compactZ);
 }
 
-PcgReport FilteredPcg::solve(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double reference,
-                             double tolerance, int maxIterations, CoupledVector& u) {
+double FilteredPcg::begin(const CoupledSystem& system, const CoupledPreconditioner& preconditioner,
+                          const CoupledVector& u) {
+    resize(system);
+    system.residual(u, m_r, m_unfiltered);
+    return precondition(system, preconditioner);
+}
+
+PcgReport FilteredPcg::finish(const CoupledSystem& system, const CoupledPreconditioner& preconditioner,
+                              double reference, double tolerance, int maxIterations, CoupledVector& u) {
     constexpr int kMostStarts = 5;
     const bool isSingle = system.precision() == Precision::Single;
     const double target = tolerance * tolerance * reference;
     PcgReport report;
-    double rho = residualNorm2(system, preconditioner, u);
-    for (int start = 0; start < kMostStarts && !(rho <= target) && report.iterations < maxIterations; ++start) {
+    for (int start = 0; start < kMostStarts && !(m_rho <= target) && report.iterations < maxIterations; ++start) {
         if (isSingle) {
-            iterateCompact(system, preconditioner, rho, target, maxIterations, report.iterations, u);
-            rho = residualNorm2(system, preconditioner, u);
+            iterateCompact(system, preconditioner, m_rho, target, maxIterations, report.iterations, u);
+            begin(system, preconditioner, u);
             continue;
         }
-        rho = iterate(system, preconditioner, rho, target, maxIterations, report.iterations, u);
+        m_rho = iterate(system, preconditioner, m_rho, target, maxIterations, report.iterations, u);
         system.residual(u, m_r, m_unfiltered);
         break;
     }
-    report.converged = rho <= target;
-    report.residual = reference > 0.0 ? std::sqrt(std::max(rho, 0.0) / reference) : 0.0;
+    report.converged = m_rho <= target;
+    report.residual = reference > 0.0 ? std::sqrt(std::max(m_rho, 0.0) / reference) : 0.0;
     return report;
 }
 

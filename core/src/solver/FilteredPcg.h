@@ -16,24 +16,31 @@ class FilteredPcg {
     /// The least tolerance that a system in single precision should be asked for: below, rounding is in the way.
     static constexpr double kLeastSingleTolerance = 1e-5;
 
-    /// Improves u, which must satisfy (I - S) s = z, until r^T P^-1 r <= tolerance^2 reference. Of a system in single
-    /// precision the iterations are; the residual that they end with is measured in double, and where it is not small
-    /// enough they start again from it.
+    /// Starts at u, which must satisfy (I - S) s = z as every u does here; returns r^T P^-1 r there.
+    double begin(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, const CoupledVector& u);
+    /// After begin: improves u until r^T P^-1 r <= tolerance^2 reference. Of a system in single precision the
+    /// iterations are; the residual that they end with is measured in double, and where it is not small enough they
+    /// start again from it.
+    PcgReport finish(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double reference,
+                     double tolerance, int maxIterations, CoupledVector& u);
+    /// All of it, from u.
     PcgReport solve(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double reference,
-                    double tolerance, int maxIterations, CoupledVector& u);
-    /// r^T P^-1 r at u: what a start costs, and the reference of a solve.
-    double residualNorm2(const CoupledSystem& system, const CoupledPreconditioner& preconditioner,
-                         const CoupledVector& u);
+                    double tolerance, int maxIterations, CoupledVector& u) {
+        begin(system, preconditioner, u);
+        return finish(system, preconditioner, reference, tolerance, maxIterations, u);
+    }
     /// (b - A v) at every vertex as of the last call of either: at the u that it left.
     const Points& unfilteredResidual() const { return m_unfiltered; }
 
   private:
     void resize(const CoupledSystem& system);
+    double precondition(const CoupledSystem& system, const CoupledPreconditioner& preconditioner);
     double iterate(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho, double target,
                    int maxIterations, int& iterations, CoupledVector& u);
     void iterateCompact(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho,
                         double target, int maxIterations, int& iterations, CoupledVector& u);
     CoupledVector m_r, m_z, m_d, m_q;
+    double m_rho = 0.0;  ///< r^T P^-1 r of m_r
     CompactVector m_compactR, m_compactZ, m_compactD, m_compactQ;
     std::vector<double> m_change;  ///< of u.s, four a vertex as in a CompactVector
     Points m_unfiltered;
