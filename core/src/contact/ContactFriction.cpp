@@ -26,32 +26,57 @@ void ContactResponse::addFriction(const Touch& touch, Mat3& damping, Vec3& load)
         return;
     }
     const Vec3 t = slip.direction;
-    damping += slip.limit / std::max(slip.speed, slowest()) * (plane - t * t.transpose());
+    damping += slip.limit / std::max(slip.speed, isQuick() ? m_creep : slowest()) * (plane - t * t.transpose());
     load -= slip.limit * t;
 }
 
-/// `fresh`: of contacts only that have none yet.
-ContactResponse::FrictionChange ContactResponse::updateFriction(const CoupledSystem& system, bool fresh) {
-    if (!fresh && ++m_frictionRounds > (isQuick() ? m_mostFrictionRounds : kFrictionRounds)) return {};
-    double most = 0.0, sum = 0.0, changed = 0.0, excess = 0.0;
-    for (const Touch& touch : m_touches) {
-        const double limit = touch.contact.friction * touch.normalImpulse;
-        most = std::max(most, limit);
-        sum += std::max(limit, 0.0);
-    }
+/// Whether some contact's change is worth another solve.
+bool ContactResponse::updateFriction(const CoupledSystem& system) {
+    if (++m_frictionRounds > kFrictionRounds) return false;
+    double most = 0.0;
+    for (const Touch& touch : m_touches) most = std::max(most, touch.contact.friction * touch.normalImpulse);
     bool isWorthIt = false;
     for (Touch& touch : m_touches) {
         const double limit = touch.contact.friction * touch.normalImpulse;
-        if (!touch.active || limit <= 0.0 || (fresh && (touch.slip.known || touch.sticks))) continue;
+        if (!touch.active || limit <= 0.0) continue;
         const double matters = kFrictionChange * std::max(limit, kMinor * most);
-        const double force = (touch.impulse - touch.normalImpulse * touch.contact.normal).norm();
         const double change = touch.sticks ? updateSticking(touch, matters, vertexStiffness(system, touch))
                                            : updateSliding(touch, matters);
-        changed += change;
-        excess += std::max(0.0, force - limit);
         isWorthIt |= change > matters;
     }
-    return isWorthIt ? FrictionChange{changed / sum, excess / sum} : FrictionChange{};
+    return isWorthIt;
+}
+
+/// The same where few rounds are made: whether most of the friction is new, or it is far more than Coulomb allows.
+/// Else it follows the last solve's impulses into the next step. `rough`: that solve cannot tell how contacts slide,
+/// and only those are looked at that have no friction yet.
+bool ContactResponse::updateFrictionQuickly(bool rough) {
+    constexpr double kMuch = 0.5;
+    if (!rough && ++m_frictionRounds > m_mostFrictionRounds) return false;
+    double sum = 0.0, fresh = 0.0, excess = 0.0;
+    for (Touch& touch : m_touches) {
+        const double limit = touch.contact.friction * touch.normalImpulse;
+        if (!touch.active || limit <= 0.0) continue;
+        sum += limit;
+        if (!touch.slip.known) fresh += limit;
+        excess += std::max(0.0, (touch.impulse - touch.normalImpulse * touch.contact.normal).norm() - limit);
+        if (!rough || !touch.slip.known) updateCreeping(touch);
+    }
+    return fresh > kMuch * sum || excess > kMuch * sum;
+}
+
+/// Coulomb's law with a ramp below the speed of creep: the gradient of a convex function of the sliding velocity.
+/// Newton's method on it; for a contact that this turns to and fro, the damping that bounds it from above.
+void ContactResponse::updateCreeping(Touch& touch) const {
+    Slip& slip = touch.slip;
+    const double speed = touch.slide.norm();
+    const bool turns = slip.known && touch.slide.dot(slip.direction) < 0.0;
+    if (turns) ++touch.flips;
+    const bool slides = speed > m_creep && !turns && touch.flips < kMostFlips;
+    slip.known = true;
+    slip.limit = touch.contact.friction * touch.normalImpulse;
+    slip.speed = std::max(speed, m_creep);
+    slip.direction = slides ? Vec3(touch.slide / speed) : Vec3::Zero();
 }
 
 /// Where contacts have not settled before the last solve, none may hold a body by more friction than there is: a light

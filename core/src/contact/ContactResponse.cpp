@@ -10,7 +10,6 @@ namespace {
 
 constexpr double kNone = -std::numeric_limits<double>::infinity();
 constexpr double kRowPenalty = 10.0;  // penalty of a soft row over the stiffness of its vertices: a round leaves < 1/10
-constexpr double kAlteration = 0.2;   // share of a penetration that a step takes back, and share of an edge at most
 constexpr double kOffsetDecay = 0.998;     // a step: a lift that is no longer needed goes away
 constexpr int kFrictionRoundsGoingOn = 2;  // the same where few are made and contacts are not new
 constexpr double kSameContact = 0.3;       // of an edge: how far the point of a face's contact may move in a step
@@ -91,6 +90,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     if (!input.contacts) return;
 
     m_care = isAmongWalls() ? kAmongWalls : kInFull;
+    m_creep = creepSpeed();
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);
     m_faceSlop = std::min(2e-4, 1e-2 * shortest);
     for (const auto& body : input.bodies)
@@ -119,6 +119,14 @@ bool ContactResponse::isAmongWalls() const {
                        [](const CoupledBody& b) { return b.prescribed && b.freeTwist.isZero(0.0); });
 }
 
+/// A fifth of what a shell may creep that is held by friction, 1e-4 sqrt(g L), L: the side of a square of its size.
+double ContactResponse::creepSpeed() const {
+    double side = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < m_edge.size(); ++k)
+        side = std::min(side, m_edge[k] * std::sqrt(0.5 * m_input.shells[k]->mesh().triangleCount()));
+    return 2e-5 * std::sqrt(std::max(m_input.gravity.norm(), 1e-3) * side);
+}
+
 void ContactResponse::addAtStart(const Contact& contact, const std::map<int, double>& room, Points& y) {
     Touch touch = makeTouch(contact);
     touch.startGap = contact.gap;
@@ -136,7 +144,7 @@ void ContactResponse::addAtStart(const Contact& contact, const std::map<int, dou
     if (memory) {
         const double scale = m_input.h / m_memoryStep;
         touch.lambda = memory->impulse * scale;
-        touch.sticks = memory->sticks;
+        touch.sticks = memory->sticks && !isQuick();
         touch.slip = memory->slip;
         touch.slip.limit *= scale;
         touch.slip.held = tangential(touch.contact.normal) * touch.slip.held * scale;
@@ -277,8 +285,9 @@ void ContactResponse::writeTo(CoupledSystem& system) {
     for (std::size_t i = 0; i < m_touches.size(); ++i) {
         Touch& touch = m_touches[i];
         touch.isRow = touch.active && !joinFilter(static_cast<int>(i), constraints);
-        if (touch.isRow) rows.push_back(makeRow(touch, system));
     }
+    for (Touch& touch : m_touches)  // after them, as what holds their vertices matters
+        if (touch.isRow) rows.push_back(makeRow(touch, system));
     for (auto& filter : m_filters) finishFilter(filter, constraints[filter.constraint], rows);
     system.setContacts(std::move(constraints), std::move(rows));
 }
@@ -406,29 +415,23 @@ bool ContactResponse::update(const CoupledSystem& system, const IslandVelocities
     if (!m_input.contacts) return false;
     for (Touch& touch : m_touches) touch.lifted = 0.0;
     readImpulses(system, solved);
-    if (isQuick()) return updateQuickly(system, solved, y, round, rough);
+    if (isQuick()) return updateQuickly(solved, y, round, rough);
     const bool released = releasePulling(round);
     // Where everything ends is worth looking at only when no contact pulls: before, velocities can be anything.
     const bool entered = !released && checkEnd(solved, y, round);
     // Friction follows the normal impulses only when these have settled: lagged behind a passing one it runs away.
-    const bool slid = !released && !entered && updateFriction(system, false).share > 0.0;
+    const bool slid = !released && !entered && updateFriction(system);
     const bool changed = released || entered || slid;
     if (changed && round + 2 == kMaxRounds) dropExcessFriction();
     return changed && round + 1 < kMaxRounds;
 }
 
-/// All at once after the first solve; later only what ends deep inside a body, and friction while much of it is new.
-/// Else friction follows the last solve's impulses into the next step. A rough solve cannot tell sticking from sliding.
-bool ContactResponse::updateQuickly(const CoupledSystem& system, const IslandVelocities& solved, const Points& y,
-                                    int round, bool rough) {
-    constexpr double kMuch = 0.5, kMuchTooMuch = 0.15;  // of all friction
+/// All at once after the first solve; later only what ends deep inside a body, and friction.
+bool ContactResponse::updateQuickly(const IslandVelocities& solved, const Points& y, int round, bool rough) {
     findAtEnd(solved, y);
     const bool released = round == 0 && releasePulling(round);
     const bool entered = (round == 0 || isAnyDeep()) && closeFound(solved, round);
-    const FrictionChange friction = updateFriction(system, rough);
-    const bool slid = friction.share > kMuch || friction.excess > kMuchTooMuch;
-    if (slid && m_frictionRounds == m_mostFrictionRounds)  // at least none pushes by more than Coulomb's limit
-        for (Touch& touch : m_touches) touch.slip.speed = std::numeric_limits<double>::infinity();
+    const bool slid = updateFrictionQuickly(rough);
     return (released || entered || slid) && round + 1 < m_care.rounds;
 }
 
@@ -487,9 +490,9 @@ void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
     for (const Touch& touch : m_touches) {
         const bool pushes = touch.active && touch.normalImpulse > 0.0;
         if (!touch.impulse.isZero(0.0))  // took part in the last solve
-            impulses.push_back({touch.contact, touch.impulse, touch.sticks, touch.slide});
+            impulses.push_back({touch.contact, touch.impulse, touch.sticks || creeps(touch), touch.slide});
         // Vertices that come and go in a sliding sheet are not without friction in the step in which they come back.
-        const bool maySlideOn = isQuick() && touch.contact.isVertex() && (touch.slip.known || touch.sticks);
+        const bool maySlideOn = isQuick() && touch.contact.isVertex() && touch.slip.known;
         if (pushes || maySlideOn)
             m_memory[keyOf(touch.contact)] = {pushes ? touch.normalImpulse : 0.0,
                                               pushes ? touch.offset : 0.0,

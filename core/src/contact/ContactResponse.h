@@ -113,9 +113,10 @@ class ContactResponse {
         int opposite = -1;  ///< a touch from the other side, by a body of prescribed motion too
     };
 
-    static constexpr int kFrictionRounds = 4;  ///< then the lagged friction of the last round stands
-    static constexpr double kNearEdge = 0.1;   ///< weight of a triangle's corner below which its contact is an edge's
-    static constexpr int kMostChanges = 10;    ///< a contact that flips more often than this stays as it is
+    static constexpr int kFrictionRounds = 4;   ///< then the lagged friction of the last round stands
+    static constexpr double kAlteration = 0.2;  ///< share of a penetration that a step takes back
+    static constexpr double kNearEdge = 0.1;    ///< weight of a triangle's corner below which its contact is an edge's
+    static constexpr int kMostChanges = 10;     ///< a contact that flips more often than this stays as it is
 
     /// Projector on the directions across a normal.
     static Mat3 tangential(const Vec3& n) { return Mat3::Identity() - n * n.transpose(); }
@@ -144,22 +145,20 @@ class ContactResponse {
     void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);
     bool releasePulling(int round);
     void addFriction(const Touch& touch, Mat3& damping, Vec3& load) const;
-    /// Shares of all friction: what has changed, and what is more than Coulomb allows. Both 0 unless some contact's
-    /// change is worth another solve by itself.
-    struct FrictionChange {
-        double share = 0.0, excess = 0.0;
-    };
-    FrictionChange updateFriction(const CoupledSystem& system, bool fresh);
-    bool updateQuickly(const CoupledSystem& system, const IslandVelocities& solved, const Points& y, int round,
-                       bool rough);
+    bool updateFriction(const CoupledSystem& system);
+    bool updateFrictionQuickly(bool rough);
+    bool updateQuickly(const IslandVelocities& solved, const Points& y, int round, bool rough);
     bool closeFound(const IslandVelocities& solved, int round);
     bool isAnyDeep() const;
     double missing(const Contact& contact, int touch) const;
     void dropExcessFriction();
     double updateSticking(Touch& touch, double matters, double stiffness) const;
     double updateSliding(Touch& touch, double matters) const;
+    void updateCreeping(Touch& touch) const;
+    bool creeps(const Touch& touch) const { return isQuick() && touch.slip.known && touch.slide.norm() <= m_creep; }
     double slowest() const { return 1e-3 * m_input.h * std::max(m_input.gravity.norm(), 1e-3); }
     bool isAmongWalls() const;
+    double creepSpeed() const;
     void findAtEnd(const IslandVelocities& solved, const Points& y);
     Vec3 push(const Contact& contact, double by, std::map<int, Vec3>& moved) const;
     bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
@@ -187,6 +186,7 @@ class ContactResponse {
     std::set<int> m_claimed;  ///< vertices of the soft rows that this round has added
     Care m_care = kInFull;
     double m_vertexSlop = 0.0, m_faceSlop = 0.0, m_deepestGap = 0.0;
+    double m_creep = 0.0;  ///< sliding speed below which friction may hold less than its limit, where isQuick() [m/s]
     int m_frictionRounds = 0, m_mostFrictionRounds = 0;
     std::vector<VertexFilter> m_filters;
     std::vector<int> m_filterOf;  ///< per vertex, -1: none
