@@ -57,8 +57,6 @@ std::unique_ptr<btCollisionShape> smallShape(const std::string& name) {
 
 TEST_P(SmallBody, IsCaughtAndBorneByASheetOfCoarseCells) {
     const auto [name, mass] = GetParam();
-    if (kBulletIsFloat && std::string(name) == "rod" && mass == 1.0)
-        GTEST_SKIP() << "a defect: with Bullet in float this rod slips through (Known limits of the README)";
     Scene scene;
     ShellMaterial cloth = trampolineCloth();
     cloth.massDamping = 5.0;

@@ -155,7 +155,9 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
         touch.contact.gap = firstGap;
         touch.target = -std::max(firstGap, 0.0) / m_input.h;
     } else {
-        touch.target = relativeVelocity(touch, solved).dot(contact.normal) - lacks / m_input.h;
+        const double take = isBetweenBodies(touch) && !isQuick() ? kAlteration * lacks : lacks;
+        touch.allowedGap += lacks - take;
+        touch.target = relativeVelocity(touch, solved).dot(contact.normal) - take / m_input.h;
     }
     return true;
 }

@@ -79,6 +79,13 @@ void ContactResponse::updateCreeping(Touch& touch) const {
     slip.direction = slides ? Vec3(touch.slide / speed) : Vec3::Zero();
 }
 
+/// Damping that was made for slower sliding holds by more than Coulomb's limit, and normal impulses follow it.
+void ContactResponse::relaxDamping() {
+    for (Touch& touch : m_touches)
+        if (touch.active && !touch.sticks && touch.slip.known)
+            touch.slip.speed = std::max(touch.slip.speed, touch.slide.norm());
+}
+
 /// Where contacts have not settled before the last solve, none may hold a body by more friction than there is: a light
 /// one would be thrown aside.
 void ContactResponse::dropExcessFriction() {

@@ -388,9 +388,21 @@ double ContactResponse::pinchedMass(const Touch& touch) const {
     return m_input.bodies[touch.contact.body].mass.diagonal().head<3>().minCoeff();
 }
 
+/// Whether a contact of a free body has a vertex that another one holds.
+bool ContactResponse::isBetweenBodies(const Touch& touch) const {
+    for (int a = 0; a < 3; ++a) {
+        const int filter = m_filterOf[globalVertex(touch.contact, a)];
+        if (touch.contact.weights[a] > 0.0 && filter >= 0 && m_touches[m_filters[filter].touches[0]].dynamicBody >= 0 &&
+            m_touches[m_filters[filter].touches[0]].contact.body != touch.contact.body)
+            return touch.dynamicBody >= 0;
+    }
+    return false;
+}
+
 SoftRow ContactResponse::makeRow(Touch& touch, const CoupledSystem& system) const {
     const Contact& c = touch.contact;
     touch.kappa = kRowPenalty * std::max(vertexStiffness(system, touch), pinchedMass(touch));
+    touch.isPinched = isBetweenBodies(touch);
     SoftRow row;
     for (int a = 0; a < 3; ++a) row.vertices[a] = globalVertex(c, a);
     row.weights = c.weights;
@@ -421,6 +433,7 @@ bool ContactResponse::update(const CoupledSystem& system, const IslandVelocities
     const bool entered = !released && checkEnd(solved, y, round);
     // Friction follows the normal impulses only when these have settled: lagged behind a passing one it runs away.
     const bool slid = !released && !entered && updateFriction(system);
+    if (released || entered) relaxDamping();
     const bool changed = released || entered || slid;
     if (changed && round + 2 == kMaxRounds) dropExcessFriction();
     return changed && round + 1 < kMaxRounds;
@@ -472,12 +485,13 @@ bool ContactResponse::releasePulling(int round) {
     for (const Touch& touch : m_touches) most = std::max(most, touch.normalImpulse);
     for (Touch& touch : m_touches) {
         if (!touch.active) continue;
-        if (touch.normalImpulse < -m_care.pull * most && !touch.jammed && touch.changes < kMostChanges) {
+        const double pull = touch.isPinched ? kAmongWalls.pull : m_care.pull;
+        if (touch.normalImpulse < -pull * most && !touch.jammed && touch.changes < kMostChanges) {
             touch.active = false;
             touch.lambda = 0.0;
             ++touch.changes;
             changed = true;
-        } else if (touch.isRow) {
+        } else if (touch.isRow && !touch.isPinched) {
             touch.lambda = std::max(touch.normalImpulse, 0.0);
         }
     }

@@ -78,6 +78,7 @@ class ContactResponse {
         double allowedGap = 0.0;  ///< <= 0: what it stood inside at the start and need not leave at once [m]
         bool active = false, sticks = false, isRow = false;
         double lambda = 0.0, kappa = 0.0;  ///< soft rows: multiplier [N s] and penalty [kg]
+        bool isPinched = false;            ///< a soft row of vertices that another body holds
         bool jammed = false;               ///< walls on both sides leave the vertex no room
         Slip slip;
         int flips = 0;        ///< between sticking and sliding, in this step
@@ -140,6 +141,7 @@ class ContactResponse {
     bool isPinched(const VertexFilter& filter, double& target) const;
     void finishFilter(VertexFilter& filter, VertexConstraint& constraint, std::vector<SoftRow>& rows);
     SoftRow makeRow(Touch& touch, const CoupledSystem& system) const;
+    bool isBetweenBodies(const Touch& touch) const;
     double pinchedMass(const Touch& touch) const;
     double vertexStiffness(const CoupledSystem& system, const Touch& touch) const;
     void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);
@@ -151,6 +153,7 @@ class ContactResponse {
     bool closeFound(const IslandVelocities& solved, int round);
     bool isAnyDeep() const;
     double missing(const Contact& contact, int touch) const;
+    void relaxDamping();
     void dropExcessFriction();
     double updateSticking(Touch& touch, double matters, double stiffness) const;
     double updateSliding(Touch& touch, double matters) const;
