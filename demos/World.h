@@ -62,7 +62,7 @@ class World {
     std::vector<BodyState> bodies() const;
     Vec3 linearMomentum() const;  ///< of shells and dynamic bodies, at one moment [N s]
     int rejectedSteps() const;    ///< since the start
-    int passedSteps() const;      ///< since the start: those in which a fast body went through a shell
+    int passedSteps() const;      ///< since the start: those in which a fast body went through a shell or may have
     bool isAsleep(int shell) const;
 
     std::vector<std::string> takeWarnings();

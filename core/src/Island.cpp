@@ -64,6 +64,7 @@ struct IslandSolver::Impl {
     Points unfiltered;               ///< (b - A v) at the solution, soft rows included
     CoupledVector u;
     Eigen::Matrix<double, 6, Eigen::Dynamic> freeTwist;
+    bool unsettled = false;                      ///< contacts of this step have used up their rounds
     int lastRounds = 1;                          ///< changes of the contacts in the last step, and one
     mutable Points at;                           ///< where velocities lead one shell
     mutable std::vector<double> elasticAtStart;  ///< of each shell at the start of the step; NaN: not yet asked for [J]
@@ -104,6 +105,7 @@ StepReport IslandSolver::solve(const IslandInput& input) {
     Impl& s = *m_impl;
     StepReport report;
     s.impulseShare = 1.0;
+    s.unsettled = false;
     s.times = {};
     s.gather(input);  // one numbering for all shells
     LapTimer lap(input);
@@ -118,6 +120,7 @@ StepReport IslandSolver::solve(const IslandInput& input) {
     LapTimer closing(input);
     report.passed = s.response.passes({s.v, s.endTwists(), s.unfiltered}, s.y);
     closing.addTo(report.times.contact);
+    report.mayPass = s.response.hasFastBody() && (report.limited || s.unsettled);
     s.store(input, report);  // velocities, twists, reactions
     return report;
 }
@@ -490,6 +493,7 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         guessTwist = u.w;
     }
     lastRounds = round + 1;
+    unsettled |= lastRounds >= ContactResponse::kMaxRounds;
 }
 
 void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {

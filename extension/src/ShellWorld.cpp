@@ -290,7 +290,7 @@ void ShellWorld::accept(Island& island, const StepReport& report, const std::vec
                         const Vec3& pendingGravity) {
     m_report.pcgIterations += report.pcgIterations;
     m_report.solves += report.solves;
-    m_report.passedSteps += report.passed ? 1 : 0;
+    m_report.passedSteps += report.passed || report.mayPass ? 1 : 0;
     m_report.limited = m_report.limited || report.limited;
     m_report.contacts += static_cast<int>(report.contacts.size());
     m_report.converged = m_report.converged && report.converged;

@@ -22,7 +22,7 @@ struct WorldReport {
     bool finite = true;           ///< false: a shell's step was rejected; it stood still
     int rejectedSteps = 0;        ///< since the world was made
     int unconvergedSteps = 0;     ///< since the world was made
-    int passedSteps = 0;          ///< since the world was made: those in which a fast body went through a shell
+    int passedSteps = 0;          ///< since the world was made: in which a fast body went through a shell, or may have
     bool limited = false;         ///< deformation was cut short, or a step would have gained energy
     StepTimes times{};            ///< of the solves, over all islands [s]
     double secondsContact = 0.0;  ///< of the narrow phase, which times.contact includes
