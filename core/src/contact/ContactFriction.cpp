@@ -47,11 +47,11 @@ bool ContactResponse::updateFriction(const CoupledSystem& system) {
     return isWorthIt;
 }
 
-/// The same where few rounds are made: whether most of the friction is new, or it is far more than Coulomb allows.
+/// The same where few rounds are made: whether most of the friction is new, or too much is more than Coulomb allows.
 /// Else it follows the last solve's impulses into the next step. `rough`: that solve cannot tell how contacts slide,
 /// and only those are looked at that have no friction yet.
 bool ContactResponse::updateFrictionQuickly(bool rough) {
-    constexpr double kMuch = 0.5;
+    constexpr double kMuch = 0.5, kMuchTooMuch = 0.2;  // of all friction
     if (!rough && ++m_frictionRounds > m_mostFrictionRounds) return false;
     double sum = 0.0, fresh = 0.0, excess = 0.0;
     for (Touch& touch : m_touches) {
@@ -62,7 +62,7 @@ bool ContactResponse::updateFrictionQuickly(bool rough) {
         excess += std::max(0.0, (touch.impulse - touch.normalImpulse * touch.contact.normal).norm() - limit);
         if (!rough || !touch.slip.known) updateCreeping(touch);
     }
-    return fresh > kMuch * sum || excess > kMuch * sum;
+    return fresh > kMuch * sum || excess > kMuchTooMuch * sum;
 }
 
 /// Coulomb's law with a ramp below the speed of creep: the gradient of a convex function of the sliding velocity.
