@@ -51,7 +51,7 @@ bool ContactResponse::updateFriction(const CoupledSystem& system) {
 /// Else it follows the last solve's impulses into the next step. `rough`: that solve cannot tell how contacts slide,
 /// and only those are looked at that have no friction yet.
 bool ContactResponse::updateFrictionQuickly(bool rough) {
-    constexpr double kMuch = 0.5, kMuchTooMuch = 0.2;  // of all friction
+    constexpr double kMuch = 0.5, kMuchTooMuch = 0.25;  // of all friction
     if (!rough && ++m_frictionRounds > m_mostFrictionRounds) return false;
     double sum = 0.0, fresh = 0.0, excess = 0.0;
     for (Touch& touch : m_touches) {
