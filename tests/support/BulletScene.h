@@ -32,7 +32,6 @@ inline double penetration(const ShellBody& sheet, const Vec3& centre, double rad
 }
 
 /// Relative accuracy that can be asked of what Bullet stores.
-constexpr bool kBulletIsFloat = sizeof(btScalar) == 4;
 constexpr double bulletTolerance(double inDouble, double inFloat) {
     return sizeof(btScalar) == 8 ? inDouble : inFloat;
 }

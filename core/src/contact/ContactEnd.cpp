@@ -155,7 +155,7 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
         touch.contact.gap = firstGap;
         touch.target = -std::max(firstGap, 0.0) / m_input.h;
     } else {
-        const double take = isBetweenBodies(touch) && !isQuick() ? kAlteration * lacks : lacks;
+        const double take = isBetweenBodies(touch) ? kAlteration * lacks : lacks;
         touch.allowedGap += lacks - take;
         touch.target = relativeVelocity(touch, solved).dot(contact.normal) - take / m_input.h;
     }
