@@ -154,7 +154,7 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
         dynamicIndex[b] = static_cast<int>(dynamicBodies.size());
         dynamicBodies.push_back(static_cast<int>(b));
     }
-    supports.begin(input.bodies, dynamicBodies);
+    supports.begin(input.bodies, input.couplings, input.rigidContacts, dynamicIndex);
     if (lastChange.cols() != count) lastChange.setZero(3, count);
     expected = start + lastChange;
 }
@@ -404,15 +404,11 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
             y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr);
         parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions()});
     }
-    std::vector<BodyCoupling> couplings;
-    for (const BodyCoupling& c : input.couplings)
-        if (dynamicIndex[c.a] >= 0 && dynamicIndex[c.b] >= 0)
-            couplings.push_back({dynamicIndex[c.a], dynamicIndex[c.b], c.mass});
     // Bodies that rest on the solution feel what single precision leaves over: soft rows and stacks lose their balance.
     const bool isSingle = dynamicBodies.empty() && linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance &&
                           input.shells[0]->settings().preconditioner == Preconditioner::IncompleteCholesky;
     system.begin(std::move(parts), static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(),
-                 std::move(couplings), isSingle ? Precision::Single : Precision::Double);
+                 supports.couplings(), isSingle ? Precision::Single : Precision::Double);
     readFreeTwists();
     lap.addTo(times.assembly);
 }
@@ -489,7 +485,7 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         lap.addTo(times.contact);
         const bool lifted = supports.update(u.w, input.h * input.gravity.norm());
         if (lifted) {
-            system.setBodies(supports.masses(), supports.freeTwists());
+            system.setBodies(supports.masses(), supports.freeTwists(), supports.couplings());
             readFreeTwists();
         }
         if (!changed && !lifted && !roughly) break;

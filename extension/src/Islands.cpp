@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "CoupledLinks.h"
+#include "RigidContacts.h"
 #include "ShellProxy.h"
 
 namespace jacket::bullet {
@@ -14,6 +15,10 @@ IslandFinder::IslandFinder(btCollisionWorld& world, Obstacles& obstacles, std::s
     : m_world(world), m_obstacles(obstacles), m_shells(shells) {
     collectPairs();
     collectAnchors();
+    sort();
+}
+
+void IslandFinder::sort() {
     std::sort(m_neighbours.begin(), m_neighbours.end(), [](const Neighbour& a, const Neighbour& b) {
         return a.object->getWorldArrayIndex() < b.object->getWorldArrayIndex();
     });
@@ -51,20 +56,16 @@ void IslandFinder::collectAnchors() {
             if (m_obstacles.isUsable(*anchor.body)) neighbour(*anchor.body).anchored.push_back(static_cast<int>(k));
 }
 
-/// For every shell the first shell of its island: shells are joined by the dynamic bodies that both have near, and by
-/// bodies that are coupled.
+/// For every shell, and then for every obstacle, the first shell of its island: shells are joined by the dynamic bodies
+/// that both have near, and by pairs of bodies that are. Obstacles of prescribed motion belong to none.
 std::vector<int> IslandFinder::leaders(const std::vector<Obstacle>& obstacles,
-                                       const std::vector<BodyCoupling>& couplings) const {
-    std::vector<int> leader(m_shells.size());
+                                       const std::vector<std::pair<int, int>>& joined) const {
+    const int shellCount = static_cast<int>(m_shells.size());
+    std::vector<int> leader(m_shells.size() + obstacles.size());
     std::iota(leader.begin(), leader.end(), 0);
     const auto find = [&](int k) {
         while (leader[k] != k) k = leader[k];
         return k;
-    };
-    const auto shellsAt = [&](std::size_t b) {
-        std::vector<int> shells = m_neighbours[b].near;
-        shells.insert(shells.end(), m_neighbours[b].anchored.begin(), m_neighbours[b].anchored.end());
-        return shells;
     };
     const auto join = [&](int k, int with) {
         const int a = find(k), c = find(with);
@@ -72,20 +73,32 @@ std::vector<int> IslandFinder::leaders(const std::vector<Obstacle>& obstacles,
     };
     for (std::size_t b = 0; b < obstacles.size(); ++b) {
         if (obstacles[b].body.prescribed) continue;
-        const std::vector<int> joined = shellsAt(b);
-        for (const int k : joined) join(k, joined.front());
+        for (const int k : m_neighbours[b].near) join(k, shellCount + static_cast<int>(b));
+        for (const int k : m_neighbours[b].anchored) join(k, shellCount + static_cast<int>(b));
     }
-    for (const auto& coupling : couplings) join(shellsAt(coupling.a).front(), shellsAt(coupling.b).front());
+    for (const auto& [a, b] : joined) join(shellCount + a, shellCount + b);
     for (std::size_t k = 0; k < leader.size(); ++k) leader[k] = find(static_cast<int>(k));
     return leader;
 }
 
 std::vector<Island> IslandFinder::find(double h, bool hasMoved) {
+    RigidContacts contacts(*m_world.getDispatcher());
+    if (!hasMoved) {
+        std::vector<btCollisionObject*> objects;
+        for (const Neighbour& n : m_neighbours) objects.push_back(n.object);
+        for (btCollisionObject* object : contacts.join(objects)) m_neighbours.push_back({object, {}, {}});
+        sort();
+    }
     std::vector<Obstacle> obstacles;
     for (const Neighbour& n : m_neighbours)
-        obstacles.push_back(m_obstacles.make(*n.object, h, *m_world.getDispatcher(), hasMoved));
+        obstacles.push_back(m_obstacles.make(*n.object, h, hasMoved ? nullptr : &contacts));
     const std::vector<BodyCoupling> couplings = coupleLinks(obstacles, m_world, hasMoved ? 0.0 : h);
-    const std::vector<int> leader = leaders(obstacles, couplings);
+    const std::vector<RigidContact> rigidContacts =
+        hasMoved ? std::vector<RigidContact>() : contacts.between(obstacles);
+    std::vector<std::pair<int, int>> joined;
+    for (const auto& c : couplings) joined.emplace_back(c.a, c.b);
+    for (const auto& c : rigidContacts) joined.emplace_back(c.a, c.b);
+    const std::vector<int> leader = leaders(obstacles, joined);
 
     std::vector<Island> islands;
     std::vector<int> islandOf(m_shells.size()), indexInIsland(m_shells.size());
@@ -107,14 +120,20 @@ std::vector<Island> IslandFinder::find(double h, bool hasMoved) {
                          inIsland);
             std::copy_if(m_neighbours[b].anchored.begin(), m_neighbours[b].anchored.end(),
                          std::back_inserter(here.anchored), inIsland);
-            if (here.near.empty() && here.anchored.empty()) continue;
+            const int own = leader[m_shells.size() + b];
+            const bool isPiled = own < static_cast<int>(m_shells.size()) && islandOf[own] == static_cast<int>(i);
+            if (here.near.empty() && here.anchored.empty() && !isPiled) continue;
             bodyIn[i][b] = static_cast<int>(islands[i].obstacles.size());
             addObstacle(islands[i], obstacles[b], here, indexInIsland);
         }
     }
-    for (std::size_t i = 0; i < islands.size(); ++i)
+    for (std::size_t i = 0; i < islands.size(); ++i) {
         for (const auto& c : couplings)
             if (bodyIn[i][c.a] >= 0) islands[i].couplings.push_back({bodyIn[i][c.a], bodyIn[i][c.b], c.mass});
+        for (const auto& c : rigidContacts)
+            if (bodyIn[i][c.a] >= 0)
+                islands[i].rigidContacts.push_back({bodyIn[i][c.a], bodyIn[i][c.b], c.rowA, c.rowB, c.weight});
+    }
     return islands;
 }
 

@@ -14,14 +14,15 @@ struct Island {
     std::vector<Obstacle> obstacles;
     std::vector<std::pair<int, int>> pairs;  ///< (shell, obstacle) that Bullet's broadphase finds near each other
     std::vector<Anchor> anchors;
-    std::vector<BodyCoupling> couplings;  ///< between obstacles
+    std::vector<BodyCoupling> couplings;      ///< between obstacles
+    std::vector<RigidContact> rigidContacts;  ///< between obstacles
 };
 
 /// Sorts shells into islands. Everything is ordered by the objects' place in the world, so that a run can be repeated.
 class IslandFinder {
   public:
     IslandFinder(btCollisionWorld& world, Obstacles& obstacles, std::span<ShellBody* const> shells);
-    /// `hasMoved`: see Obstacles::make.
+    /// `hasMoved`: bodies have made their motion already, see Obstacles::make.
     std::vector<Island> find(double h, bool hasMoved);
 
   private:
@@ -34,7 +35,9 @@ class IslandFinder {
     void collectPairs();
     void notePair(const btCollisionObject* proxy, btCollisionObject* object);
     void collectAnchors();
-    std::vector<int> leaders(const std::vector<Obstacle>& obstacles, const std::vector<BodyCoupling>& couplings) const;
+    void sort();
+    std::vector<int> leaders(const std::vector<Obstacle>& obstacles,
+                             const std::vector<std::pair<int, int>>& joined) const;
     void addObstacle(Island& island, const Obstacle& obstacle, const Neighbour& neighbour,
                      const std::vector<int>& indexInIsland) const;
 

@@ -10,6 +10,7 @@
 
 #include "Checks.h"
 #include "CoupledLinks.h"
+#include "RigidContacts.h"
 #include "jacket/Types.h"
 
 namespace jacket::bullet {
@@ -20,14 +21,6 @@ constexpr double kTeleport = 50.0;  // [m/s]
 constexpr double kTeleportRadii = 4.0;
 // A direction in which Bullet does not let a body move takes part with this many times its mass.
 constexpr double kLocked = 1e8;
-// Along a rigid contact that bore load in the last solve, a body is this many times heavier than it is.
-constexpr double kSupport = 1e4;
-
-Vec6 twistOf(const btRigidBody& body) {
-    Vec6 twist;
-    twist << fromBullet(body.getLinearVelocity()), fromBullet(body.getAngularVelocity());
-    return twist;
-}
 
 Mat6 massOf(const btRigidBody& body) {
     const double mass = 1.0 / double(body.getInvMass());
@@ -48,62 +41,6 @@ Mat6 massOf(const btRigidBody& body) {
     return result;
 }
 
-/// Velocity that the body will have after the coming step if nothing touches it: forces as they stand, gravity
-/// included.
-Vec6 freeTwistOf(const btRigidBody& body, double h) {
-    Vec6 twist = twistOf(body);
-    if (!body.isActive()) return twist;
-    twist.head<3>() += h * double(body.getInvMass()) * fromBullet(body.getTotalForce());
-    twist.tail<3>() += h * (fromBullet(body.getInvInertiaTensorWorld()) * fromBullet(body.getTotalTorque()));
-    return twist;
-}
-
-/// Velocity that a body's point will have after the coming step if nothing touches the body.
-Vec3 pointVelocity(const btRigidBody& body, const Vec3& at, double h) {
-    const Vec6 twist = body.isStaticOrKinematicObject() ? twistOf(body) : freeTwistOf(body, h);
-    return twist.head<3>() + twist.tail<3>().cross(at - fromBullet(body.getCenterOfMassPosition()));
-}
-
-int loadedPoints(const btPersistentManifold& manifold) {
-    int count = 0;
-    for (int k = 0; k < manifold.getNumContacts(); ++k)
-        count += manifold.getContactPoint(k).m_appliedImpulse > btScalar(0);
-    return count;
-}
-
-/// Rigid contacts that carried impulse in the last solve stay in this one as stiff rows, or a shell would press a
-/// supported box through the floor.
-void addSupports(btDispatcher& dispatcher, const btRigidBody& body, double h, CoupledBody& coupled) {
-    const double mass = coupled.mass.diagonal().head<3>().minCoeff();
-    for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
-        const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(m);
-        const bool first = manifold.getBody0() == &body;
-        if (!first && manifold.getBody1() != &body) continue;
-        const btCollisionObject* otherObject = first ? manifold.getBody1() : manifold.getBody0();
-        if (!otherObject->hasContactResponse()) continue;  // a shell, shown to the user: see ContactManifolds
-        const auto* other = btRigidBody::upcast(otherObject);
-        const bool isFree = other && other->getInvMass() > 0 && other->isActive();
-        const int points = loadedPoints(manifold);  // a free body is as heavy as it is, over all of them
-        const double weight = isFree ? 1.0 / (double(other->getInvMass()) * std::max(points, 1)) : kSupport * mass;
-        for (int k = 0; k < manifold.getNumContacts(); ++k) {
-            const btManifoldPoint& point = manifold.getContactPoint(k);
-            if (!(point.m_appliedImpulse > btScalar(0))) continue;
-            const Vec3 n = (first ? 1.0 : -1.0) * fromBullet(point.m_normalWorldOnB);
-            const Vec3 at = fromBullet(first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
-            const Vec6 row = (Vec6() << n, (at - coupled.position).cross(n)).finished();
-            const double velocity = other ? pointVelocity(*other, at, h).dot(n) : 0.0;
-            coupled.supports.push_back({row, velocity, weight});
-        }
-    }
-    if (coupled.supports.empty()) return;
-    Vec6 momentum = coupled.mass * coupled.freeTwist;
-    for (const auto& [row, velocity, weight] : coupled.supports) {
-        coupled.mass += weight * row * row.transpose();
-        momentum += weight * velocity * row;
-    }
-    coupled.freeTwist = coupled.mass.ldlt().solve(momentum);
-}
-
 }  // namespace
 
 Frame moved(const Frame& start, const Vec6& twist, double time) {
@@ -115,7 +52,8 @@ Frame moved(const Frame& start, const Vec6& twist, double time) {
     return frame;
 }
 
-Obstacle Obstacles::make(btCollisionObject& object, double h, btDispatcher& dispatcher, bool hasMoved) {
+Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContacts* contacts) {
+    const bool hasMoved = !contacts;
     Obstacle obstacle{&object, &piecesOf(*object.getCollisionShape()), fromBullet(object.getWorldTransform()), {}};
     CoupledBody& coupled = obstacle.body;
     btVector3 centre;
@@ -143,7 +81,7 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, btDispatcher& disp
         if (moves && !hasMoved && m_gravityIsNoForce)
             coupled.freeTwist.head<3>() += h * fromBullet(rigid->getGravity());
         if (moves) coupled.mass = massOf(*rigid);
-        if (moves && !hasMoved) addSupports(dispatcher, *rigid, h, coupled);
+        if (moves && contacts) contacts->addSupports(*rigid, h, coupled);
     }
     coupled.position = obstacle.start.translation();
     return obstacle;

@@ -276,6 +276,7 @@ void ShellWorld::solveIsland(Island& island, double h) {
     input.shells = shells;
     input.bodies = coupled;
     input.couplings = island.couplings;
+    input.rigidContacts = island.rigidContacts;
     input.anchors = island.anchors;
     input.contacts = island.pairs.empty() ? nullptr : &timed;
     input.clock = &seconds;

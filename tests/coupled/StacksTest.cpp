@@ -77,10 +77,8 @@ INSTANTIATE_TEST_SUITE_P(Grid, LoadedBox,
 class StackOnCloth : public ::testing::TestWithParam<std::tuple<int, double>> {};
 
 TEST_P(StackOnCloth, StandsAndSleeps) {
-    // Wanted: any number stays within 1 cm and sleeps. Measured: three creep by up to 2 cm and are still awake after 8
-    // s.
-
     const auto [count, h] = GetParam();
+    const bool isHard = count == 3 && h > 0.01;  // of five starts 1e-12 to 1e-6 m aside, two are awake after 8 s
     Scene<> scene;
     scene.addBox(btVector3(1, btScalar(0.1), 1), 0, btVector3(0, btScalar(-0.1), 0));
     TriangleMesh mesh = squareSheet(0.6, 8);
@@ -93,11 +91,11 @@ TEST_P(StackOnCloth, StandsAndSleeps) {
     scene.run(8.0, h);
     for (int i = 0; i < count; ++i) {
         const btTransform& place = boxes[i]->getWorldTransform();
-        EXPECT_LT(std::hypot(place.getOrigin().x(), place.getOrigin().z()), count < 3 ? 0.01 : 0.03) << "box " << i;
+        EXPECT_LT(std::hypot(place.getOrigin().x(), place.getOrigin().z()), 0.01) << "box " << i;
         EXPECT_GT(place.getBasis()[1].y(), 0.999) << "box " << i;
         EXPECT_NEAR(double(place.getOrigin().y()), 0.1 + 0.2 * i + 2 * cloth.contactThickness(), 2e-3) << "box " << i;
     }
-    EXPECT_TRUE(cloth.isAsleep() || count == 3);
+    EXPECT_TRUE(cloth.isAsleep() || isHard);
 }
 INSTANTIATE_TEST_SUITE_P(Grid, StackOnCloth,
                          ::testing::Combine(::testing::Values(1, 2, 3), ::testing::Values(1.0 / 60, 1.0 / 240)));

@@ -39,6 +39,16 @@ struct BodyCoupling {
     Mat6 mass = Mat6::Zero();  ///< M_ab: body a has momentum M_ab w_b, body b has M_ab^T w_a
 };
 
+/// A rigid contact between two dynamic bodies of the island, which bore load when the step began: it keeps
+/// rowA . w_a + rowB . w_b from falling below zero, by a stiff term. Masses and free twists are given without it. With
+/// a body of prescribed motion it does nothing.
+struct RigidContact {
+    int a = 0, b = 0;          ///< bodies, a != b
+    Vec6 rowA = Vec6::Zero();  ///< how fast it opens, from the twist of a
+    Vec6 rowB = Vec6::Zero();  ///< and from that of b
+    double weight = 0.0;       ///< of the stiff term [kg], > 0
+};
+
 /// Where a piece of a shell meets a body: one vertex (weights 1 0 0), or a point of an edge or triangle.
 struct Contact {
     int shell = 0;                  ///< index in the island

@@ -14,6 +14,7 @@ struct IslandInput {
     std::span<Shell* const> shells{};
     std::span<CoupledBody> bodies{};  ///< `twist` and `impulse` are written
     std::span<const BodyCoupling> couplings{};
+    std::span<const RigidContact> rigidContacts{};
     std::span<const Anchor> anchors{};
     ContactDetector* contacts = nullptr;  ///< none: no contacts
     double (*clock)() = nullptr;          ///< [s]; null: no times are taken

@@ -3,39 +3,116 @@
 #include <Eigen/Cholesky>
 
 namespace jacket {
+namespace {
 
-void BodySupports::begin(std::span<const CoupledBody> bodies, const std::vector<int>& dynamicBodies) {
+constexpr double kPull = 1e-2;   // of a body's weight: a contact that pulls less may stay for the step
+constexpr int kMostReturns = 1;  // a contact that has let go twice stays away: it closes in the bodies' own step
+
+}  // namespace
+
+void BodySupports::begin(std::span<const CoupledBody> bodies, std::span<const BodyCoupling> couplings,
+                         std::span<const RigidContact> contacts, const std::vector<int>& dynamicIndex) {
     m_supports.clear();
+    m_pairs.clear();
     m_mass.clear();
+    m_momentum.clear();
     m_freeTwist.clear();
-    for (const int b : dynamicBodies) {
+    m_couplings.clear();
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+        if (dynamicIndex[b] < 0) continue;
         for (const BodySupport& contact : bodies[b].supports)
-            m_supports.push_back({.body = static_cast<int>(m_mass.size()), .contact = contact});
+            m_supports.push_back({.body = dynamicIndex[b], .contact = contact});
         m_mass.push_back(bodies[b].mass);
+        m_momentum.push_back(bodies[b].mass * bodies[b].freeTwist);
         m_freeTwist.push_back(bodies[b].freeTwist);
     }
+    for (const BodyCoupling& c : couplings) {
+        if (dynamicIndex[c.a] < 0 || dynamicIndex[c.b] < 0) continue;
+        m_couplings.push_back({dynamicIndex[c.a], dynamicIndex[c.b], c.mass});
+        m_momentum[dynamicIndex[c.a]] += c.mass * bodies[c.b].freeTwist;
+        m_momentum[dynamicIndex[c.b]] += c.mass.transpose() * bodies[c.a].freeTwist;
+    }
+    m_givenCouplings = m_couplings.size();
+    for (RigidContact contact : contacts) {
+        contact.a = dynamicIndex[contact.a];
+        contact.b = dynamicIndex[contact.b];
+        if (contact.a < 0 || contact.b < 0) continue;
+        m_pairs.push_back({contact});
+        m_couplings.push_back({contact.a, contact.b});
+        add(m_pairs.back(), 1.0);
+    }
+    if (!m_pairs.empty()) solveFreeTwists();
+}
+
+/// The term of the pair that m_couplings has at the same place, or takes it away.
+void BodySupports::add(const Pair& pair, double sign) {
+    const auto& [a, b, rowA, rowB, weight] = pair.contact;
+    m_mass[a] += sign * weight * rowA * rowA.transpose();
+    m_mass[b] += sign * weight * rowB * rowB.transpose();
+    m_couplings[m_givenCouplings + static_cast<std::size_t>(&pair - m_pairs.data())].mass +=
+        sign * weight * rowA * rowB.transpose();
+}
+
+/// Bodies that no pair joins have their own, the others those of the joint mass matrix.
+void BodySupports::solveFreeTwists() {
+    std::vector<int> place(m_mass.size(), -1);
+    int size = 0;
+    const auto take = [&](int body) {
+        if (place[body] >= 0) return;
+        place[body] = size;
+        size += 6;
+    };
+    if (!m_pairs.empty())
+        for (const BodyCoupling& c : m_couplings) take(c.a), take(c.b);
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(size, size);
+    Eigen::VectorXd momentum(size);
+    for (std::size_t b = 0; b < m_mass.size(); ++b) {
+        if (place[b] < 0) continue;
+        matrix.block<6, 6>(place[b], place[b]) = m_mass[b];
+        momentum.segment<6>(place[b]) = m_momentum[b];
+    }
+    for (const BodyCoupling& c : m_couplings) {
+        if (size == 0) break;
+        matrix.block<6, 6>(place[c.a], place[c.b]) += c.mass;
+        matrix.block<6, 6>(place[c.b], place[c.a]) += c.mass.transpose();
+    }
+    if (size > 0) momentum = matrix.ldlt().solve(momentum);
+    for (std::size_t b = 0; b < m_mass.size(); ++b)
+        if (place[b] >= 0) m_freeTwist[b] = momentum.segment<6>(place[b]);
+}
+
+bool BodySupports::Hold::turn(double opening, double most) {
+    const bool turns = holds ? opening > most : opening < 0.0;
+    if (!turns || (!holds && returns == kMostReturns)) return false;
+    if (!holds) ++returns;
+    holds = !holds;
+    return true;
+}
+
+double BodySupports::lightest(int body) const {
+    return m_mass[body].diagonal().head<3>().minCoeff();
 }
 
 bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, double kick) {
-    constexpr double kPull = 1e-2;   // of a body's weight: a contact that pulls less may stay for the step
-    constexpr int kMostReturns = 1;  // a contact that has let go twice stays away: it closes in the bodies' own step
     bool changed = false;
     for (Support& support : m_supports) {
         const auto& [row, velocity, weight] = support.contact;
         const double opening = row.dot(w.col(support.body)) - velocity;
-        const double least = m_mass[support.body].diagonal().head<3>().minCoeff() * kPull * kick / weight;
-        const bool turns = support.holds ? opening > least : opening < 0.0;
-        if (!turns || (!support.holds && support.returns == kMostReturns)) continue;
-        const double sign = support.holds ? -1.0 : 1.0;
-        Mat6& mass = m_mass[support.body];
-        Vec6& freeTwist = m_freeTwist[support.body];
-        const Vec6 momentum = mass * freeTwist + sign * weight * velocity * row;
-        mass += sign * weight * row * row.transpose();
-        freeTwist = mass.ldlt().solve(momentum);
-        if (!support.holds) ++support.returns;
-        support.holds = !support.holds;
+        if (!support.hold.turn(opening, lightest(support.body) * kPull * kick / weight)) continue;
+        const double sign = support.hold.holds ? 1.0 : -1.0;
+        m_mass[support.body] += sign * weight * row * row.transpose();
+        m_momentum[support.body] += sign * weight * velocity * row;
+        m_freeTwist[support.body] = m_mass[support.body].ldlt().solve(m_momentum[support.body]);
         changed = true;
     }
+    for (Pair& pair : m_pairs) {
+        const auto& [a, b, rowA, rowB, weight] = pair.contact;
+        const double opening = rowA.dot(w.col(a)) + rowB.dot(w.col(b));
+        if (!pair.hold.turn(opening, std::min(lightest(a), lightest(b)) * kPull * kick / weight)) continue;
+        add(pair, pair.hold.holds ? 1.0 : -1.0);
+        changed = true;
+    }
+    if (changed && !m_pairs.empty()) solveFreeTwists();
     return changed;
 }
 

@@ -10,24 +10,43 @@ namespace jacket {
 /// a body off what carries it: the contact then lets go, or the shell would have to move the ground with it.
 class BodySupports {
   public:
-    /// All contacts hold. `dynamicBodies`: indices in `bodies`.
-    void begin(std::span<const CoupledBody> bodies, const std::vector<int>& dynamicBodies);
+    /// All contacts hold. `dynamicIndex`: of each body among the dynamic ones, -1: prescribed.
+    void begin(std::span<const CoupledBody> bodies, std::span<const BodyCoupling> couplings,
+               std::span<const RigidContact> contacts, const std::vector<int>& dynamicIndex);
     /// Lets go of contacts that pull and takes hold of those that close, at the solved twists; true if any changed.
     /// `kick`: what gravity does in the step [m/s].
     bool update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, double kick);
     const std::vector<Mat6>& masses() const { return m_mass; }
     const std::vector<Vec6>& freeTwists() const { return m_freeTwist; }
+    const std::vector<BodyCoupling>& couplings() const { return m_couplings; }
 
   private:
+    /// Whether a contact holds, and how often it came back in this step.
+    struct Hold {
+        bool holds = true;
+        int returns = 0;
+        bool turn(double opening, double most);
+    };
     struct Support {
         int body;  ///< among the dynamic ones
         BodySupport contact;
-        bool holds = true;
-        int returns = 0;
+        Hold hold{};
     };
+    struct Pair {
+        RigidContact contact;  ///< between dynamic ones
+        Hold hold{};
+    };
+
+    void add(const Pair& pair, double sign);
+    double lightest(int body) const;
+    void solveFreeTwists();
+
     std::vector<Support> m_supports;
+    std::vector<Pair> m_pairs;
     std::vector<Mat6> m_mass;
-    std::vector<Vec6> m_freeTwist;
+    std::vector<Vec6> m_momentum, m_freeTwist;
+    std::vector<BodyCoupling> m_couplings;  ///< those that were given, then one for each pair
+    std::size_t m_givenCouplings = 0;
 };
 
 }  // namespace jacket

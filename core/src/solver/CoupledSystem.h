@@ -86,10 +86,12 @@ class CoupledSystem {
     /// `couplings`: off-diagonal blocks of the mass, between dynamic bodies by their index here.
     void begin(std::vector<ShellPart> shells, int vertexCount, std::vector<Mat6> mass, std::vector<Vec6> freeTwist,
                std::vector<BodyCoupling> couplings = {}, Precision precision = Precision::Double);
-    /// Replaces the bodies' own masses and free twists.
-    void setBodies(const std::vector<Mat6>& mass, const std::vector<Vec6>& freeTwist) {
+    /// Replaces the bodies' masses and free twists.
+    void setBodies(const std::vector<Mat6>& mass, const std::vector<Vec6>& freeTwist,
+                   const std::vector<BodyCoupling>& couplings) {
         m_mass = mass;
         m_freeTwist = freeTwist;
+        m_couplings = couplings;
     }
     /// Replaces all constraints and rows. At most one constraint per vertex.
     void setContacts(std::vector<VertexConstraint> constraints, std::vector<SoftRow> rows);

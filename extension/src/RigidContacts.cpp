@@ -1,0 +1,152 @@
+#include "RigidContacts.h"
+
+#include <BulletCollision/BroadphaseCollision/btDispatcher.h>
+#include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "Checks.h"
+#include "Obstacles.h"
+#include "jacket/Types.h"
+
+namespace jacket::bullet {
+namespace {
+
+constexpr double kSupport = 1e4;         // so many times heavier than its body is what bears it
+constexpr std::size_t kMostJoined = 64;  // bodies of all piles: their masses are factored together
+
+bool isFree(const btCollisionObject& object) {
+    const btRigidBody* body = btRigidBody::upcast(&object);
+    return body && body->getInvMass() > btScalar(0) && body->isActive() && !body->isStaticOrKinematicObject();
+}
+
+double massOf(const btRigidBody& body) {
+    return 1.0 / double(body.getInvMass());
+}
+
+bool bears(const btManifoldPoint& point) {
+    return point.m_appliedImpulse > btScalar(0);
+}
+
+int loadedPoints(const btPersistentManifold& manifold) {
+    int count = 0;
+    for (int k = 0; k < manifold.getNumContacts(); ++k) count += bears(manifold.getContactPoint(k));
+    return count;
+}
+
+const btCollisionObject* otherThan(const btCollisionObject& object, const btPersistentManifold& manifold) {
+    return manifold.getBody0() == &object ? manifold.getBody1() : manifold.getBody0();
+}
+
+/// Velocity that a body's point will have after the coming step if nothing touches the body.
+Vec3 pointVelocity(const btRigidBody& body, const Vec3& at, double h) {
+    const Vec6 twist = body.isStaticOrKinematicObject() ? twistOf(body) : freeTwistOf(body, h);
+    return twist.head<3>() + twist.tail<3>().cross(at - fromBullet(body.getCenterOfMassPosition()));
+}
+
+/// Velocity of a body's point along a direction, from its twist.
+Vec6 rowOf(const Vec3& direction, const Vec3& at, const Vec3& centre) {
+    return (Vec6() << direction, (at - centre).cross(direction)).finished();
+}
+
+}  // namespace
+
+Vec6 twistOf(const btRigidBody& body) {
+    Vec6 twist;
+    twist << fromBullet(body.getLinearVelocity()), fromBullet(body.getAngularVelocity());
+    return twist;
+}
+
+Vec6 freeTwistOf(const btRigidBody& body, double h) {
+    Vec6 twist = twistOf(body);
+    if (!body.isActive()) return twist;
+    twist.head<3>() += h * double(body.getInvMass()) * fromBullet(body.getTotalForce());
+    twist.tail<3>() += h * (fromBullet(body.getInvInertiaTensorWorld()) * fromBullet(body.getTotalTorque()));
+    return twist;
+}
+
+RigidContacts::RigidContacts(btDispatcher& dispatcher) {
+    for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
+        btPersistentManifold* manifold = dispatcher.getManifoldByIndexInternal(m);
+        if (loadedPoints(*manifold) == 0) continue;
+        const btCollisionObject *first = manifold->getBody0(), *second = manifold->getBody1();
+        if (!first->hasContactResponse() || !second->hasContactResponse()) continue;  // a shell: see ContactManifolds
+        m_manifolds[first].push_back(manifold);
+        m_manifolds[second].push_back(manifold);
+    }
+}
+
+const std::vector<btPersistentManifold*>& RigidContacts::manifoldsOf(const btCollisionObject& object) const {
+    static const std::vector<btPersistentManifold*> kNone;
+    const auto known = m_manifolds.find(&object);
+    return known == m_manifolds.end() ? kNone : known->second;
+}
+
+std::vector<btCollisionObject*> RigidContacts::join(const std::vector<btCollisionObject*>& bodies) {
+    std::vector<btCollisionObject*> pile, fresh;
+    for (btCollisionObject* body : bodies)
+        if (isFree(*body) && m_joined.insert(body).second) pile.push_back(body);
+    for (std::size_t next = 0; next < pile.size(); ++next)  // the nearest first
+        for (const btPersistentManifold* manifold : manifoldsOf(*pile[next])) {
+            auto* other = const_cast<btCollisionObject*>(otherThan(*pile[next], *manifold));
+            if (m_joined.size() >= kMostJoined || !isFree(*other) || defectOf(*other) || !m_joined.insert(other).second)
+                continue;
+            pile.push_back(other);
+            fresh.push_back(other);
+        }
+    return fresh;
+}
+
+void RigidContacts::addSupports(const btRigidBody& body, double h, CoupledBody& coupled) const {
+    for (const btPersistentManifold* manifold : manifoldsOf(body)) {
+        const btCollisionObject* otherObject = otherThan(body, *manifold);
+        if (m_joined.count(&body) > 0 && m_joined.count(otherObject) > 0) continue;
+        const bool first = manifold->getBody0() == &body;
+        const auto* other = btRigidBody::upcast(otherObject);
+        const double weight =  // a free body's is spread over its points
+            isFree(*otherObject) ? massOf(*other) / loadedPoints(*manifold) : kSupport * massOf(body);
+        for (int k = 0; k < manifold->getNumContacts(); ++k) {
+            const btManifoldPoint& point = manifold->getContactPoint(k);
+            if (!bears(point)) continue;
+            const Vec3 n = (first ? 1.0 : -1.0) * fromBullet(point.m_normalWorldOnB);
+            const Vec3 at = fromBullet(first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
+            const double velocity = other ? pointVelocity(*other, at, h).dot(n) : 0.0;
+            coupled.supports.push_back({rowOf(n, at, coupled.position), velocity, weight});
+        }
+    }
+    if (coupled.supports.empty()) return;
+    Vec6 momentum = coupled.mass * coupled.freeTwist;
+    for (const auto& [row, velocity, weight] : coupled.supports) {
+        coupled.mass += weight * row * row.transpose();
+        momentum += weight * velocity * row;
+    }
+    coupled.freeTwist = coupled.mass.ldlt().solve(momentum);
+}
+
+std::vector<RigidContact> RigidContacts::between(const std::vector<Obstacle>& obstacles) const {
+    std::unordered_map<const btCollisionObject*, int> indexOf;
+    for (int b = 0; b < static_cast<int>(obstacles.size()); ++b)
+        if (m_joined.count(obstacles[b].object) > 0) indexOf[obstacles[b].object] = b;
+    std::vector<RigidContact> contacts;
+    for (int b = 0; b < static_cast<int>(obstacles.size()); ++b) {
+        if (indexOf.count(obstacles[b].object) == 0) continue;
+        for (const btPersistentManifold* manifold : manifoldsOf(*obstacles[b].object)) {
+            const auto other = indexOf.find(manifold->getBody1());
+            if (manifold->getBody0() != obstacles[b].object || other == indexOf.end()) continue;
+            const CoupledBody &first = obstacles[b].body, &second = obstacles[other->second].body;
+            const double weight = kSupport * std::max(massOf(*btRigidBody::upcast(manifold->getBody0())),
+                                                      massOf(*btRigidBody::upcast(manifold->getBody1())));
+            for (int k = 0; k < manifold->getNumContacts(); ++k) {
+                const btManifoldPoint& point = manifold->getContactPoint(k);
+                if (!bears(point) && point.getDistance() > btScalar(0)) continue;  // corners bear load by turns
+                const Vec3 n = fromBullet(point.m_normalWorldOnB);
+                contacts.push_back({b, other->second, rowOf(n, fromBullet(point.getPositionWorldOnA()), first.position),
+                                    rowOf(-n, fromBullet(point.getPositionWorldOnB()), second.position), weight});
+            }
+        }
+    }
+    return contacts;
+}
+
+}  // namespace jacket::bullet
