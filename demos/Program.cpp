@@ -25,10 +25,31 @@ constexpr const char* kExamples =
     "\n"
     "Exit codes: 0 ok, 2 bad input, 3 not converged, 4 not finite.";
 
-/// CLI11 wants its mistakes printed by itself; ours are one line.
+/// The command that was being read.
+const CLI::App& parsed(const CLI::App& app) {
+    const auto used = app.get_subcommands();
+    return used.empty() ? app : parsed(*used.front());
+}
+
+/// What would have been right: the option that a misspelt one resembles, or what one with a bad value is for.
+std::string hint(const CLI::App& command, const CLI::ParseError& error) {
+    const std::string message = error.what();
+    std::vector<std::string> names;
+    for (const CLI::Option* option : command.get_options()) {
+        const std::string name = option->get_name();
+        names.push_back(name);
+        if (message.find(name + " ") != std::string::npos || message.starts_with(name + ":"))
+            return "; " + name + ": " + option->get_description();
+    }
+    const auto word = message.rfind("--");
+    if (error.get_exit_code() != static_cast<int>(CLI::ExitCodes::ExtrasError) || word == std::string::npos) return "";
+    return suggestion(message.substr(word, message.find_first_of(" =", word) - word), names);
+}
+
+/// CLI11 wants its mistakes printed by itself; ours are short.
 int reportUsage(const CLI::App& app, const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-    std::cerr << "jacket: " << error.what()
+    std::cerr << "jacket: " << error.what() << hint(parsed(app), error)
               << "\nRun \"jacket --help\" or \"jacket COMMAND --help\" for what can be given.\n";
     return kBadInput;
 }

@@ -113,6 +113,8 @@ TEST(Program, BadInputIsExitCode2WithOneMessageAndNothingWritten) {
     EXPECT_EQ(jacket({"run", scene, "--png", "1"}).exitCode, 2);
     EXPECT_EQ(jacket({"run", scene, "--nonsense"}).exitCode, 2);
     EXPECT_EQ(jacket({}).exitCode, 2);
+    EXPECT_NE(jacket({"run", scene, "--thread", "2"}).err.find("did you mean \"--threads\"?"), std::string::npos);
+    EXPECT_NE(jacket({"bench", "--sizes", "11,x"}).err.find("--sizes: Vertices along a side"), std::string::npos);
     EXPECT_NE(jacket({"rum"}).err.find("there is no command \"rum\"; did you mean \"run\"?"), std::string::npos);
 }
 
