@@ -3,6 +3,7 @@
 
 #include "ShellAssembly.h"
 #include "jacket/Shell.h"
+#include "solver/CompactShell.h"
 #include "solver/IncompleteCholesky.h"
 
 namespace jacket {
@@ -84,6 +85,55 @@ void factorOrApply(benchmark::State& state, bool factorEach) {
 }
 BENCHMARK_CAPTURE(factorOrApply, factor, true)->Arg(31)->Arg(101);
 BENCHMARK_CAPTURE(factorOrApply, apply, false)->Arg(31)->Arg(101);
+
+/// What a solve in single precision is made of.
+enum class Compact { Take, Product, Factor, Apply, CoarseBuild, CoarseApply };
+
+void compact(benchmark::State& state, Compact part) {
+    const Shell sheet = swingingSheet(int(state.range(0)));
+    ShellAssembly assembly(sheet, designOf(sheet));
+    const Points y = Points::Zero(3, sheet.vertexCount());
+    const BlockMatrix& blocks = assembly.assemble(sheet, kStep, kGravity, nullptr, sheet.velocities(), y).matrix;
+    CompactShell shell(blocks);
+    shell.matrix.setValues(blocks);
+    shell.factor.factor(blocks.diagonal(), blocks.lower());
+    CoarseSpace coarse(shell.matrix);
+    const std::vector<const Mat3*> free(sheet.vertexCount(), nullptr);
+    coarse.build(shell.matrix, sheet.positions(), free, {});
+    std::vector<float> x(4 * static_cast<std::size_t>(sheet.vertexCount()), 0.0f), result(x.size(), 0.0f);
+    for (std::size_t i = 0; i < x.size(); i += 4)
+        Eigen::Map<Eigen::Vector3f>(x.data() + i) = sheet.positions().col(static_cast<int>(i / 4)).cast<float>();
+    for (auto _ : state) {
+        switch (part) {
+            case Compact::Take:
+                shell.matrix.setValues(blocks);
+                break;
+            case Compact::Product:
+                shell.matrix.multiply(x.data(), result.data());
+                break;
+            case Compact::Factor:
+                shell.factor.factor(blocks.diagonal(), blocks.lower());
+                break;
+            case Compact::Apply:
+                shell.factor.apply(x.data(), result.data());
+                break;
+            case Compact::CoarseBuild:
+                coarse.build(shell.matrix, sheet.positions(), free, {});
+                break;
+            case Compact::CoarseApply:
+                coarse.addTo(x.data(), result.data());
+                break;
+        }
+        benchmark::ClobberMemory();
+    }
+    perVertex(state);
+}
+BENCHMARK_CAPTURE(compact, take, Compact::Take)->Arg(31)->Arg(101);
+BENCHMARK_CAPTURE(compact, product, Compact::Product)->Arg(31)->Arg(101);
+BENCHMARK_CAPTURE(compact, factor, Compact::Factor)->Arg(31)->Arg(101);
+BENCHMARK_CAPTURE(compact, apply, Compact::Apply)->Arg(31)->Arg(101);
+BENCHMARK_CAPTURE(compact, coarseBuild, Compact::CoarseBuild)->Arg(31)->Arg(101);
+BENCHMARK_CAPTURE(compact, coarseApply, Compact::CoarseApply)->Arg(31)->Arg(101);
 
 void wholeStep(benchmark::State& state) {
     Shell sheet = swingingSheet(int(state.range(0)));
