@@ -14,7 +14,7 @@ namespace jacket::bullet {
 namespace {
 
 constexpr double kSupport = 1e4;         // so many times heavier than its body is what bears it
-constexpr std::size_t kMostJoined = 64;  // bodies of all piles: their masses are factored together
+constexpr std::size_t kMostJoined = 32;  // bodies of all piles: their masses are factored together
 
 bool isFree(const btCollisionObject& object) {
     const btRigidBody* body = btRigidBody::upcast(&object);
@@ -66,9 +66,9 @@ Vec6 freeTwistOf(const btRigidBody& body, double h) {
     return twist;
 }
 
-RigidContacts::RigidContacts(btDispatcher& dispatcher) {
-    for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
-        btPersistentManifold* manifold = dispatcher.getManifoldByIndexInternal(m);
+void RigidContacts::index() {
+    for (int m = 0; m < m_dispatcher.getNumManifolds(); ++m) {
+        btPersistentManifold* manifold = m_dispatcher.getManifoldByIndexInternal(m);
         if (loadedPoints(*manifold) == 0) continue;
         const btCollisionObject *first = manifold->getBody0(), *second = manifold->getBody1();
         if (!first->hasContactResponse() || !second->hasContactResponse()) continue;  // a shell: see ContactManifolds
@@ -87,6 +87,7 @@ std::vector<btCollisionObject*> RigidContacts::join(const std::vector<btCollisio
     std::vector<btCollisionObject*> pile, fresh;
     for (btCollisionObject* body : bodies)
         if (isFree(*body) && m_joined.insert(body).second) pile.push_back(body);
+    if (!pile.empty()) index();                             // most shells touch what stands still
     for (std::size_t next = 0; next < pile.size(); ++next)  // the nearest first
         for (const btPersistentManifold* manifold : manifoldsOf(*pile[next])) {
             auto* other = const_cast<btCollisionObject*>(otherThan(*pile[next], *manifold));

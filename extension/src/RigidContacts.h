@@ -23,9 +23,9 @@ Vec6 freeTwistOf(const btRigidBody& body, double h);
 /// too, or a shell would press a supported box through the floor, and feel only the lowest one of a pile.
 class RigidContacts {
   public:
-    explicit RigidContacts(btDispatcher& dispatcher);
-    /// The free bodies of the piles that these belong to, up to a number that a solve can carry. Contacts between any
-    /// of all these are `between`'s, and not `addSupports`' any more.
+    explicit RigidContacts(btDispatcher& dispatcher) : m_dispatcher(dispatcher) {}
+    /// To be called first. The free bodies of the piles that these belong to, up to a number that a solve can carry.
+    /// Contacts between any of all these are `between`'s, and not `addSupports`' any more.
     std::vector<btCollisionObject*> join(const std::vector<btCollisionObject*>& bodies);
     /// What holds a body in the coming step of length h besides the joined bodies: stiff terms of its mass. A free body
     /// among that is as heavy as it is.
@@ -34,8 +34,10 @@ class RigidContacts {
     std::vector<RigidContact> between(const std::vector<Obstacle>& obstacles) const;
 
   private:
+    void index();
     const std::vector<btPersistentManifold*>& manifoldsOf(const btCollisionObject& object) const;
 
+    btDispatcher& m_dispatcher;
     std::unordered_map<const btCollisionObject*, std::vector<btPersistentManifold*>> m_manifolds;
     std::unordered_set<const btCollisionObject*> m_joined;
 };

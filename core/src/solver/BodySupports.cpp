@@ -76,7 +76,7 @@ void BodySupports::solveFreeTwists() {
         matrix.block<6, 6>(place[c.a], place[c.b]) += c.mass;
         matrix.block<6, 6>(place[c.b], place[c.a]) += c.mass.transpose();
     }
-    if (size > 0) momentum = matrix.ldlt().solve(momentum);
+    if (size > 0) momentum = matrix.llt().solve(momentum);
     for (std::size_t b = 0; b < m_mass.size(); ++b)
         if (place[b] >= 0) m_freeTwist[b] = momentum.segment<6>(place[b]);
 }
