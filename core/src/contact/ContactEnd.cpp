@@ -245,15 +245,10 @@ std::vector<ContactResponse::Push> ContactResponse::whatToPush(const Points& v) 
         for (int a = 0; a < (contact.isVertex() ? 1 : 3); ++a) near.emplace(globalVertex(contact, a), &contact);
     }
     for (int i = 0; i < static_cast<int>(m_touches.size()); ++i) {
-        const Touch& touch = m_touches[i];
-        const Contact& contact = touch.contact;
+        const Contact& contact = m_touches[i].contact;
         const int vertex = globalVertex(contact, 0);
         if (!contact.isVertex() || found.count(i) > 0 || m_held[vertex]) continue;
-        const Vec3 move = m_end[contact.shell].col(contact.vertices[0]) -
-                          m_input.shells[contact.shell]->positions().col(contact.vertices[0]) -
-                          m_input.h * touch.carried;
-        double gap = touch.startGap + move.dot(contact.normal) - touch.offset - touch.allowedGap;
-        if (std::isnan(gap)) gap = touch.active ? 0.0 : std::numeric_limits<double>::infinity();
+        const double gap = gapBefore(m_touches[i]);
         const auto [first, last] = near.equal_range(vertex);
         const bool isValley = std::any_of(first, last, [&](const auto& other) {
             return other.second->normal.dot(contact.point - other.second->point) > 0.0;
@@ -263,6 +258,17 @@ std::vector<ContactResponse::Push> ContactResponse::whatToPush(const Points& v) 
         if (first != last || lacks < -m_vertexSlop) pushes.push_back({&contact, -lacks});
     }
     return pushes;
+}
+
+/// How far a vertex ends from a wall that the start found, or that holds it, as m_found saw the end; infinite where
+/// that is not known [m].
+double ContactResponse::gapBefore(const Touch& touch) const {
+    const Contact& contact = touch.contact;
+    const Vec3 move = m_end[contact.shell].col(contact.vertices[0]) -
+                      m_input.shells[contact.shell]->positions().col(contact.vertices[0]) - m_input.h * touch.carried;
+    const double gap = touch.startGap + move.dot(contact.normal) - touch.offset - touch.allowedGap;
+    if (!std::isnan(gap)) return gap;
+    return touch.active ? 0.0 : std::numeric_limits<double>::infinity();
 }
 
 /// How a corner of a contact moves besides what m_found saw.

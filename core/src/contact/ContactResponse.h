@@ -171,6 +171,7 @@ class ContactResponse {
     double creepSpeed() const;
     void findAtEnd(const IslandVelocities& solved, const Points& y);
     std::vector<Push> whatToPush(const Points& v) const;
+    double gapBefore(const Touch& touch) const;
     Vec3 sinceFound(const Contact& contact, int corner, const Points& v) const;
     bool push(Push& one, std::map<int, Vec3>& moved) const;
     bool isHeld(const Contact& contact) const;
