@@ -48,15 +48,20 @@ FeaturePoint toManifoldPoint(const BodyContact& impulse) {
 class ContactManifolds::Pair final : public btCollisionAlgorithm {
   public:
     struct State {
+        const ShellBody& shell;
         btPersistentManifold& manifold;
+        int touchedAt = 0;  ///< the last update in which they touched
         std::array<int, MANIFOLD_CACHE_SIZE> features{};
     };
-    Pair(const btCollisionAlgorithmConstructionInfo& info, ContactManifolds& owner, btPersistentManifold& manifold)
-        : btCollisionAlgorithm(info), m_owner(owner), m_state(std::make_unique<State>(manifold)) {
+    Pair(const btCollisionAlgorithmConstructionInfo& info, ContactManifolds& owner, const ShellBody& shell,
+         btPersistentManifold& manifold)
+        : btCollisionAlgorithm(info), m_owner(owner), m_state(std::make_unique<State>(shell, manifold)) {
+        m_owner.m_alive.insert(this);
         manifold.setContactProcessingThreshold(btScalar(-BT_LARGE_FLOAT));  // solvers convert no point of it
     }
     ~Pair() override {
         std::erase(m_owner.m_pairs, this);
+        m_owner.m_alive.erase(this);
         m_dispatcher->releaseManifold(&m_state->manifold);
     }
     void processCollision(const btCollisionObjectWrapper*, const btCollisionObjectWrapper*, const btDispatcherInfo&,
@@ -68,6 +73,7 @@ class ContactManifolds::Pair final : public btCollisionAlgorithm {
     void getAllContactManifolds(btManifoldArray& manifolds) override { manifolds.push_back(&m_state->manifold); }
 
     btPersistentManifold& manifold() const { return m_state->manifold; }
+    State& state() const { return *m_state; }
     void setPoints(std::span<const FeaturePoint> points);
 
   private:
@@ -107,11 +113,15 @@ std::vector<ContactManifolds::Touch> ContactManifolds::collect(btCollisionWorld&
                                                                std::span<const std::unique_ptr<ShellBody>> shells) {
     std::vector<Touch> touches;
     for (const auto& shell : shells) {
+        if (shell->isAsleep()) continue;
+        const auto first = static_cast<std::ptrdiff_t>(touches.size());  // of this shell
         for (std::size_t i = 0; i < shell->contacts().size(); ++i) {
             const btCollisionObject& body = *shell->contacts()[i].object;
             Pair* pair = pairOf(world, *shell, body);
             if (!pair) continue;
-            auto touch = std::find_if(touches.begin(), touches.end(), [&](const Touch& t) { return t.pair == pair; });
+            pair->state().touchedAt = m_updates;
+            auto touch =
+                std::find_if(touches.begin() + first, touches.end(), [&](const Touch& t) { return t.pair == pair; });
             if (touch == touches.end()) touch = touches.insert(touch, {pair, {}});
             touch->points.push_back(toManifoldPoint(shell->contacts()[i]));
         }
@@ -134,29 +144,32 @@ ContactManifolds::Pair* ContactManifolds::pairOf(btCollisionWorld& world, ShellB
         world.getPairCache()->findPair(const_cast<btBroadphaseProxy*>(proxy.getBroadphaseHandle()),
                                        const_cast<btBroadphaseProxy*>(body.getBroadphaseHandle()));
     if (!found) return nullptr;
-    const auto known = std::find(m_pairs.begin(), m_pairs.end(), found->m_algorithm);
-    if (known != m_pairs.end()) return *known;
+    if (m_alive.count(found->m_algorithm) > 0) return static_cast<Pair*>(found->m_algorithm);
     world.getPairCache()->cleanOverlappingPair(*found, &dispatcher);  // Bullet's own, made before the pair was hidden
     btPersistentManifold* manifold = dispatcher.getNewManifold(&proxy, &body);
     if (!manifold) return nullptr;
     const btCollisionAlgorithmConstructionInfo info(&dispatcher, 0);
-    Pair* pair = new (dispatcher.allocateCollisionAlgorithm(sizeof(Pair))) Pair(info, *this, *manifold);
+    Pair* pair = new (dispatcher.allocateCollisionAlgorithm(sizeof(Pair))) Pair(info, *this, shell, *manifold);
     found->m_algorithm = pair;
     m_pairs.push_back(pair);
     return pair;
 }
 
 bool ContactManifolds::isAlive(const Pair* pair) const {
-    return std::find(m_pairs.begin(), m_pairs.end(), pair) != m_pairs.end();
+    return m_alive.count(pair) > 0;
 }
 
 void ContactManifolds::update(btCollisionWorld& world, std::span<const std::unique_ptr<ShellBody>> shells) {
+    ++m_updates;
     const std::vector<Touch> touches = collect(world, shells);
+    std::vector<Pair*> ended;  // shells that sleep touch what they touched
+    std::copy_if(m_pairs.begin(), m_pairs.end(), std::back_inserter(ended), [&](const Pair* pair) {
+        return pair->state().touchedAt != m_updates && pair->manifold().getNumContacts() > 0 &&
+               !pair->state().shell.isAsleep();
+    });
     // From here on every callback may remove shells and bodies, and with them pairs: ask before using one.
-    for (Pair* pair : std::vector<Pair*>(m_pairs)) {
-        const bool touching =
-            std::any_of(touches.begin(), touches.end(), [&](const Touch& t) { return t.pair == pair; });
-        if (touching || !isAlive(pair) || pair->manifold().getNumContacts() == 0) continue;
+    for (Pair* pair : ended) {
+        if (!isAlive(pair)) continue;
         btPersistentManifold* manifold = &pair->manifold();
         pair->setPoints({});  // first, or a callback that removes the body would end the contact once more
         if (gContactEndedCallback && isAlive(pair)) gContactEndedCallback(manifold);

@@ -1,17 +1,19 @@
 #pragma once
 #include <memory>
 #include <span>
+#include <unordered_set>
 #include <vector>
 
 #include "jacket/bullet/ShellBody.h"
 
+class btCollisionAlgorithm;
 class btCollisionWorld;
 
 namespace jacket::bullet {
 
 /// Shows contacts of shells to Bullet's users: a btPersistentManifold (shell, body) in the dispatcher for every pair
 /// that touches or has touched, and the standard callbacks gContactStarted-, -Processed- and -EndedCallback. Bullet's
-/// solvers never respond to these manifolds.
+/// solvers never respond to these manifolds. Those of sleeping shells stay as they are, and are not processed.
 class ContactManifolds {
   public:
     ContactManifolds() = default;
@@ -29,6 +31,8 @@ class ContactManifolds {
     Pair* pairOf(btCollisionWorld& world, ShellBody& shell, const btCollisionObject& body);
     bool isAlive(const Pair* pair) const;
     std::vector<Pair*> m_pairs;  ///< owned by Bullet's pair cache, which destroys them when shell or body leaves
+    std::unordered_set<const btCollisionAlgorithm*> m_alive;  ///< the same
+    int m_updates = 0;
 };
 
 }  // namespace jacket::bullet

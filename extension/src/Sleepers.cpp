@@ -60,18 +60,19 @@ void fallAsleep(btCollisionObject& object) {
 Sleepers::Sleepers(btCollisionWorld& world, Obstacles& obstacles, std::span<const std::unique_ptr<ShellBody>> shells)
     : m_world(world), m_obstacles(obstacles), m_shells(shells) {}
 
-bool Sleepers::contains(const btCollisionObject* object) const {
+bool Sleepers::contains(const ShellRest::Support& support) const {
     const auto& objects = m_world.getCollisionObjectArray();
     const int count = objects.size();
-    for (int i = 0; i < count; ++i)
-        if (objects[i] == object) return true;
+    if (support.place < count && objects[support.place] == support.object) return true;
+    for (support.place = 0; support.place < count; ++support.place)  // others have left
+        if (objects[support.place] == support.object) return true;
     return false;
 }
 
 void Sleepers::wakeUp(ShellBody& shell) {
     ShellRest& rest = *shell.m_rest;
     for (const auto& support : rest.supports)
-        if (contains(support.object) && !support.object->isStaticOrKinematicObject()) support.object->activate();
+        if (contains(support) && !support.object->isStaticOrKinematicObject()) support.object->activate();
     const double boundsSpeed = rest.boundsSpeed;
     rest = {};
     rest.boundsSpeed = boundsSpeed;
@@ -88,7 +89,7 @@ bool Sleepers::isDisturbed(const ShellBody& shell, const Vec3& gravity) const {
     const ShellRest& rest = *shell.m_rest;
     if (rest.wakeAsked || rest.revision != shell.shell().revision() || rest.gravity != gravity) return true;
     return std::any_of(rest.supports.begin(), rest.supports.end(), [&](const auto& support) {
-        return !contains(support.object) || !sleeps(*support.object) ||
+        return !contains(support) || !sleeps(*support.object) ||
                !samePose(support.object->getWorldTransform(), support.pose);
     });
 }
@@ -157,7 +158,7 @@ void Sleepers::rest(const Vec3& gravity, double h) {
         rest.gravity = gravity;
         for (btCollisionObject* object : c.supports) {
             jacket::bullet::fallAsleep(*object);
-            rest.supports.push_back({object, object->getWorldTransform()});
+            rest.supports.push_back({object, object->getWorldTransform(), object->getWorldArrayIndex()});
         }
     }
 }

@@ -22,6 +22,7 @@ struct ShellRest {
     struct Support {
         btCollisionObject* object;
         btTransform pose;
+        mutable int place;  ///< in the world's list, where it was last found
     };
     std::vector<Support> supports;  ///< what it touched or was tied to
 };
@@ -51,7 +52,7 @@ class Sleepers {
     void wakeTouched(double h);
     bool touches(const ShellBody& shell, btCollisionObject& object, double h);
     std::vector<btCollisionObject*> supportsOf(const ShellBody& shell) const;
-    bool contains(const btCollisionObject* object) const;
+    bool contains(const ShellRest::Support& support) const;
     btCollisionWorld& m_world;
     Obstacles& m_obstacles;
     std::span<const std::unique_ptr<ShellBody>> m_shells;

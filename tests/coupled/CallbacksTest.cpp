@@ -273,6 +273,27 @@ INSTANTIATE_TEST_SUITE_P(Kinds, Solvers,
                          ::testing::Combine(::testing::Values("sequential", "nncg", "mlcp"), ::testing::Bool()));
 
 /// Bullet wakes what a moving contact touches; a shell's manifold is none.
+TEST(Callbacks, ContactsOfASleepingShellStayAndAreNotProcessed) {
+    Listener listener;
+    Scene<> scene;
+    scene.addBox(btVector3(1, 1, 1), 0, btVector3(0, -1, 0));
+    TriangleMesh mesh = squareSheet(0.4, 4);
+    mesh.positions.row(1).array() += 4e-4;
+    auto& sheet = scene.shells->add(mesh, trampolineCloth());
+    scene.run(3.0, 1.0 / 60);
+    ASSERT_TRUE(sheet.isAsleep());
+    const int processed = listener.processed;
+    scene.run(0.5, 1.0 / 60);
+    EXPECT_EQ(listener.started, 1);
+    EXPECT_EQ(listener.ended, 0);
+    EXPECT_EQ(listener.processed, processed);
+    const btPersistentManifold& manifold = *scene.dispatcher.getManifoldByIndexInternal(0);
+    EXPECT_GT(manifold.getNumContacts(), 0);
+    sheet.setVelocity(btVector3(0, 2, 0));
+    scene.run(0.2, 1.0 / 60);
+    EXPECT_EQ(listener.ended, 1);
+}
+
 TEST(Callbacks, ManifoldsWakeNobody) {
     Scene scene;
     scene.addFloor(-0.5);
