@@ -3,7 +3,6 @@
 #include <jacket/testing.h>
 
 #include <cmath>
-#include <ctime>
 
 namespace jacket::bullet {
 namespace {

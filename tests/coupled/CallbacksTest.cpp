@@ -272,7 +272,6 @@ TEST_P(Solvers, MoveBodiesTheSameWhoeverListens) {
 INSTANTIATE_TEST_SUITE_P(Kinds, Solvers,
                          ::testing::Combine(::testing::Values("sequential", "nncg", "mlcp"), ::testing::Bool()));
 
-/// Bullet wakes what a moving contact touches; a shell's manifold is none.
 TEST(Callbacks, ContactsOfASleepingShellStayAndAreNotProcessed) {
     Listener listener;
     Scene<> scene;
@@ -294,6 +293,7 @@ TEST(Callbacks, ContactsOfASleepingShellStayAndAreNotProcessed) {
     EXPECT_EQ(listener.ended, 1);
 }
 
+/// Bullet wakes what a moving contact touches; a shell's manifold is none.
 TEST(Callbacks, ManifoldsWakeNobody) {
     Scene scene;
     scene.addFloor(-0.5);

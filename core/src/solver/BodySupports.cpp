@@ -53,7 +53,8 @@ void BodySupports::add(const Pair& pair, double sign) {
         sign * weight * rowA * rowB.transpose();
 }
 
-/// Bodies that no pair joins have their own, the others those of the joint mass matrix.
+/// Of bodies that couplings join: those of their common mass matrix. Only where there are pairs; free twists that were
+/// given agree with the given couplings.
 void BodySupports::solveFreeTwists() {
     std::vector<int> place(m_mass.size(), -1);
     int size = 0;
@@ -62,8 +63,7 @@ void BodySupports::solveFreeTwists() {
         place[body] = size;
         size += 6;
     };
-    if (!m_pairs.empty())
-        for (const BodyCoupling& c : m_couplings) take(c.a), take(c.b);
+    for (const BodyCoupling& c : m_couplings) take(c.a), take(c.b);
     Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(size, size);
     Eigen::VectorXd momentum(size);
     for (std::size_t b = 0; b < m_mass.size(); ++b) {
@@ -72,11 +72,10 @@ void BodySupports::solveFreeTwists() {
         momentum.segment<6>(place[b]) = m_momentum[b];
     }
     for (const BodyCoupling& c : m_couplings) {
-        if (size == 0) break;
         matrix.block<6, 6>(place[c.a], place[c.b]) += c.mass;
         matrix.block<6, 6>(place[c.b], place[c.a]) += c.mass.transpose();
     }
-    if (size > 0) momentum = matrix.llt().solve(momentum);
+    momentum = matrix.llt().solve(momentum);
     for (std::size_t b = 0; b < m_mass.size(); ++b)
         if (place[b] >= 0) m_freeTwist[b] = momentum.segment<6>(place[b]);
 }
