@@ -65,6 +65,11 @@ bool ContactResponse::checkEnd(const IslandVelocities& solved, const Points& y, 
 bool ContactResponse::closeFound(const IslandVelocities& solved, int round) {
     m_deepestGap = 0.0;
     m_claimed.clear();
+    m_raised.clear();
+    for (const Contact& contact : m_found) {
+        const double lacks = contact.isVertex() ? missing(contact, touchOf(contact)) : 0.0;
+        if (lacks < -m_vertexSlop) m_raised.try_emplace(globalVertex(contact, 0), -lacks * contact.normal);
+    }
     bool changed = false;
     for (const Contact& contact : m_found) changed |= closeAtEnd(contact, solved, round);
     return changed;
@@ -169,6 +174,12 @@ bool ContactResponse::liftVertices(const Contact& contact, double by, const Isla
     const double most = kMostOffset * m_edge[contact.shell];
     double carried = 0.0;
     std::array<Touch*, 3> touches{};
+    for (int a = 0; a < 3; ++a) {
+        if (contact.weights[a] == 0.0) continue;
+        if (const auto raised = m_raised.find(globalVertex(contact, a)); raised != m_raised.end())
+            by -= contact.weights[a] * std::max(0.0, raised->second.dot(contact.normal));
+    }
+    if (by < m_vertexSlop) return true;
     for (int a = 0; a < 3; ++a) {
         if (contact.weights[a] == 0.0) continue;
         Contact vertex = contact;

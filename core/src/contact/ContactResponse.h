@@ -186,7 +186,9 @@ class ContactResponse {
     std::vector<char> m_fast;       ///< per body: may pass a shell within the step
     bool m_anyFast = false;
     std::vector<Contact> m_found;
-    std::set<int> m_claimed;  ///< vertices of the soft rows that this round has added
+    std::map<int, Vec3> m_raised;  ///< by what their own contacts take vertices out of bodies in this round [m]
+    std::set<int> m_claimed;       ///< vertices of the soft rows that this round has added
+    std::set<int> m_forgotten;     ///< bodies
     Care m_care = kInFull;
     double m_vertexSlop = 0.0, m_faceSlop = 0.0, m_deepestGap = 0.0;
     double m_creep = 0.0;  ///< sliding speed below which friction may hold less than its limit, where isQuick() [m/s]
