@@ -197,7 +197,10 @@ double hill(double x, double z) {
     return 0.15 * std::exp(-(x * x + z * z) / 0.08);
 }
 
-TEST(Heightfield, AClothDrapesOverAHill) {
+/// Where normals turn from step to step; started a little aside, by multiples of 3.7e-9 m, as a step's rounding would.
+class Heightfield : public ::testing::TestWithParam<int> {};
+
+TEST_P(Heightfield, AClothDrapesOverAHill) {
     const int n = 41;
     std::vector<float> heights(n * n);
     for (int j = 0; j < n; ++j)
@@ -207,7 +210,7 @@ TEST(Heightfield, AClothDrapesOverAHill) {
     BulletScene scene;
     scene.addBody(std::move(shape), 0, btVector3(0, 0, 0));
     auto& sheet = scene.shells->add(squareSheet(0.8, 16), trampolineCloth());
-    place(sheet, {0.01, 0.17, 0.02});
+    place(sheet, {0.01 + 3.7e-9 * GetParam(), 0.17, 0.02});
     // The surface between the grid's points, with the diagonal that Bullet draws: from (i, j + 1) to (i + 1, j).
     const auto surface = [&](double x, double z) {
         const double u = (x + 0.8) / 0.04, v = (z + 0.8) / 0.04;
@@ -226,8 +229,9 @@ TEST(Heightfield, AClothDrapesOverAHill) {
     EXPECT_LT(sheet.positions()[0].y(), 0.05);  // a corner has come down
     EXPECT_EQ(scene.shells->lastStep().rejectedSteps, 0);
 }
+INSTANTIATE_TEST_SUITE_P(Starts, Heightfield, ::testing::Values(0, 27, 37, 51));
 
-TEST(Heightfield, EditedInPlaceLiftsWhatLiesOnIt) {
+TEST(EditedHeightfield, LiftsWhatLiesOnIt) {
     std::vector<float> heights(21 * 21, 0.0f);
     auto shape =
         std::make_unique<btHeightfieldTerrainShape>(21, 21, heights.data(), btScalar(-1), btScalar(1), 1, false);

@@ -25,7 +25,8 @@ void ContactResponse::addFriction(const Touch& touch, Mat3& damping, Vec3& load)
         load += slip.held;
         return;
     }
-    const Vec3 t = slip.direction;
+    // The normal may have turned since: with a part of t along it this would not be positive semidefinite.
+    const Vec3 t = (plane * slip.direction).normalized();
     damping += slip.limit / std::max(slip.speed, isQuick() ? m_creep : slowest()) * (plane - t * t.transpose());
     load -= slip.limit * t;
 }
