@@ -118,8 +118,25 @@ double ContactResponse::updateSticking(Touch& touch, double matters, double stif
     return std::max(limit, force - limit);
 }
 
-/// A contact sticks once friction turns its sliding around.
-double ContactResponse::updateSliding(Touch& touch, double matters) const {
+/// What a free body opposes to an impulse at a contact, along unit t [kg].
+double ContactResponse::bodyInertia(const Touch& touch, const Vec3& t) const {
+    Vec6 along;
+    along << t, touch.arm.cross(t);
+    return 1.0 / along.dot(m_input.bodies[touch.contact.body].mass.ldlt().solve(along));
+}
+
+/// Whether sliding friction would turn the sliding of a free body around, rather than slow it down: at once if the body
+/// is light, to a speed that has nothing to do with the scene's.
+bool ContactResponse::wouldTurn(const Touch& touch, double limit, double stiffness) const {
+    const double speed = touch.slide.norm();
+    if (touch.dynamicBody < 0 || speed == 0.0) return false;
+    const double body = bodyInertia(touch, touch.slide / speed);
+    return limit * (1.0 / body + 1.0 / stiffness) > speed;
+}
+
+/// A contact sticks once friction turns its sliding around, or would. `stiffness`: impulse over velocity of its
+/// vertices [kg].
+double ContactResponse::updateSliding(Touch& touch, double matters, double stiffness) const {
     const Slip old = touch.slip;
     Slip& slip = touch.slip;
     slip.known = true;
