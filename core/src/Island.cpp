@@ -69,7 +69,8 @@ struct IslandSolver::Impl {
     mutable Points at;                           ///< where velocities lead one shell
     mutable std::vector<double> elasticAtStart;  ///< of each shell at the start of the step; NaN: not yet asked for [J]
     StepTimes times;                             ///< of the step so far
-    double impulseShare = 1.0;  ///< of the solved contacts that a step cut short takes: see limitDeformation
+    double impulseShare = 1.0;      ///< of the solved contacts that a step cut short takes: see limitDeformation
+    std::vector<double> bodyShare;  ///< of that, what each dynamic body takes: see limitBodies
 
     void gather(const IslandInput& input);
     void beginTwoStep(const IslandInput& input, std::size_t shell);
@@ -81,6 +82,8 @@ struct IslandSolver::Impl {
     bool bodiesLead(const IslandInput& input) const;
     void limitDeformation(const IslandInput& input, StepReport& report);
     void blend(const IslandInput& input, const Points& other);
+    double shareWithin(const CoupledBody& body, int dynamic, double speed) const;
+    void limitBodies(const IslandInput& input, StepReport& report);
     Points rigidMotion(const IslandInput& input, const Points& velocities) const;
     Eigen::Matrix<double, 6, Eigen::Dynamic> endTwists() const;
     bool improves(const IslandInput& input, const Points& before);
@@ -117,6 +120,7 @@ StepReport IslandSolver::solve(const IslandInput& input) {
         report.finite = report.converged = false;
         return report;
     }
+    if (!s.dynamicBodies.empty()) s.limitBodies(input, report);
     LapTimer closing(input);
     report.passed = s.response.passes({s.v, s.endTwists(), s.unfiltered}, s.y);
     closing.addTo(report.times.contact);
@@ -148,6 +152,7 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
         dynamicIndex[b] = static_cast<int>(dynamicBodies.size());
         dynamicBodies.push_back(static_cast<int>(b));
     }
+    bodyShare.assign(dynamicBodies.size(), 1.0);
     supports.begin(input.bodies, input.couplings, input.rigidContacts, dynamicIndex);
     if (lastChange.cols() != count) lastChange.setZero(3, count);
     expected = start + lastChange;
@@ -288,6 +293,7 @@ void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& 
         blend(input, coasting);
         impulseShare *= 0.5;
     }
+    for (std::size_t b = 0; impulseShare < 1.0 && b < input.bodies.size(); ++b) response.forget(static_cast<int>(b));
 }
 
 /// Half way from the solved velocities to others, where vertices are free.
@@ -323,7 +329,45 @@ Points IslandSolver::Impl::rigidMotion(const IslandInput& input, const Points& v
 
 /// Twists of the dynamic bodies at the end of the step.
 Eigen::Matrix<double, 6, Eigen::Dynamic> IslandSolver::Impl::endTwists() const {
-    return freeTwist + impulseShare * (u.w - freeTwist);
+    const Eigen::Map<const Eigen::RowVectorXd> share(bodyShare.data(), freeTwist.cols());
+    return freeTwist + impulseShare * ((u.w - freeTwist).array().rowwise() * share.array()).matrix();
+}
+
+/// The largest share of its solved change of twist with which a body keeps within its energy without the shells and
+/// that of its mass at `speed`.
+double IslandSolver::Impl::shareWithin(const CoupledBody& body, int dynamic, double speed) const {
+    constexpr int kMostHalvings = 40;
+    const Vec6 before = freeTwist.col(dynamic), change = impulseShare * (u.w.col(dynamic) - before);
+    const auto energy = [&](const Vec6& twist) { return 0.5 * twist.dot(body.mass * twist); };
+    const double mass = body.mass.topLeftCorner<3, 3>().trace() / 3.0;
+    const double most = std::max(energy(body.freeTwist), energy(before)) + 0.5 * mass * speed * speed;
+    double share = 1.0;
+    for (int i = 0; i < kMostHalvings; ++i, share *= 0.5)
+        if (energy(before + share * change) <= most) return share;
+    return 0.0;
+}
+
+/// What a shell pushes cannot become much faster than the shell: a body that does, as light ones may where contacts did
+/// not settle, takes a share of their impulses only, and what they remember is forgotten. Where they did not settle,
+/// the shell's velocities at the start are what is known of it.
+void IslandSolver::Impl::limitBodies(const IslandInput& input, StepReport& report) {
+    const bool isSure = !unsettled && !report.limited;
+    const std::vector<double> speeds = isSure ? response.speedsBeside(start, v) : response.speedsBeside(start, start);
+    double least = 1.0;
+    for (std::size_t b = 0; b < dynamicBodies.size(); ++b) {
+        const int body = dynamicBodies[b];
+        const bool isAnchored = std::any_of(input.anchors.begin(), input.anchors.end(),
+                                            [&](const auto& anchor) { return anchor.body == body; });
+        if (isAnchored || !(speeds[body] >= 0.0)) continue;
+        const double speed = (isSure ? kMostOvertaking : 1.0) * speeds[body];
+        bodyShare[b] = shareWithin(input.bodies[body], static_cast<int>(b), speed);
+        least = std::min(least, bodyShare[b]);
+        if (bodyShare[b] < 1.0) response.forget(body);
+    }
+    if (least == 1.0) return;
+    report.limited = true;
+    if (!input.couplings.empty() || !input.rigidContacts.empty())  // what joins them must not be torn
+        std::fill(bodyShare.begin(), bodyShare.end(), least);
 }
 
 /// Whether most of the energy comes with the bodies.
@@ -497,7 +541,10 @@ void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
     Eigen::Matrix<double, 6, Eigen::Dynamic> change;
     const Eigen::Matrix<double, 6, Eigen::Dynamic> twists = endTwists();
     system.momentum(twists - freeTwist, change);
-    for (ContactImpulse& contact : report.contacts) contact.impulse *= impulseShare;
+    for (ContactImpulse& contact : report.contacts) {
+        const int dynamic = dynamicIndex[contact.contact.body];
+        contact.impulse *= impulseShare * (dynamic < 0 ? 1.0 : bodyShare[dynamic]);
+    }
     for (std::size_t b = 0; b < input.bodies.size(); ++b) {
         CoupledBody& body = input.bodies[b];
         body.twist = body.prescribed ? body.freeTwist : Vec6(twists.col(dynamicIndex[b]));

@@ -1,5 +1,6 @@
 #include "contact/ContactResponse.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -42,7 +43,7 @@ bool ContactResponse::updateFriction(const CoupledSystem& system) {
         if (!touch.active || limit <= 0.0) continue;
         const double matters = kFrictionChange * std::max(limit, kMinor * most);
         const double change = touch.sticks ? updateSticking(touch, matters, vertexStiffness(system, touch))
-                                           : updateSliding(touch, matters);
+                                           : updateSliding(touch, matters, vertexStiffness(system, touch));
         isWorthIt |= change > matters;
     }
     return isWorthIt;
@@ -67,16 +68,21 @@ bool ContactResponse::updateFrictionQuickly(bool rough) {
 }
 
 /// Coulomb's law with a ramp below the speed of creep: the gradient of a convex function of the sliding velocity.
-/// Newton's method on it; for a contact that this turns to and fro, the damping that bounds it from above.
+/// Newton's method on it: sliding friction until that turns the sliding around, then a damping. If this holds by less
+/// than the limit and the limit would stop the vertex, it sticks: else vertices that go too far by turns would drive
+/// each other on for ever.
 void ContactResponse::updateCreeping(Touch& touch) const {
     Slip& slip = touch.slip;
-    const double speed = touch.slide.norm();
+    const double speed = touch.slide.norm(), limit = touch.contact.friction * touch.normalImpulse;
     const bool turns = slip.known && touch.slide.dot(slip.direction) < 0.0;
     if (turns) ++touch.flips;
-    const bool slides = speed > m_creep && !turns && touch.flips < kMostFlips;
+    const bool wasDamped = slip.known && slip.direction.isZero(0.0);
+    const double more = wasDamped ? limit * std::max(0.0, 1.0 - speed / slip.speed) : 0.0;
+    const bool sticks = speed * m_input.shells[touch.contact.shell]->masses()[touch.contact.vertices[0]] < more;
+    const bool slides = speed > m_creep && !turns && !sticks && touch.flips < kMostFlips;
     slip.known = true;
-    slip.limit = touch.contact.friction * touch.normalImpulse;
-    slip.speed = std::max(speed, m_creep);
+    slip.limit = limit;
+    slip.speed = sticks ? m_creep : std::max(speed, m_creep);
     slip.direction = slides ? Vec3(touch.slide / speed) : Vec3::Zero();
 }
 
@@ -143,7 +149,8 @@ double ContactResponse::updateSliding(Touch& touch, double matters, double stiff
     slip.limit = touch.contact.friction * touch.normalImpulse;
     slip.speed = touch.slide.norm();
     const bool turns = old.known && touch.slide.dot(old.direction) <= 0.0;
-    if ((turns || slip.speed < slowest()) && touch.flips < kMostFlips) {
+    const bool turnsNext = !old.known && wouldTurn(touch, slip.limit, stiffness);
+    if ((turns || turnsNext || slip.speed < slowest()) && touch.flips < kMostFlips) {
         touch.sticks = true;
         slip.held.setZero();
         ++touch.flips;

@@ -71,6 +71,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     m_stepOf = numbering.stepOf;
     m_touches.clear();
     m_index.clear();
+    m_forgotten.clear();
     m_deepestGap = 0.0;
     m_frictionRounds = 0;
     m_mostFrictionRounds = m_memory.empty() ? kFrictionRounds : kFrictionRoundsGoingOn;
@@ -498,6 +499,19 @@ bool ContactResponse::releasePulling(int round) {
     return changed && round + 1 < kMaxRounds;
 }
 
+std::vector<double> ContactResponse::speedsBeside(const Points& a, const Points& b) const {
+    std::vector<double> speeds(m_input.bodies.size(), -1.0);
+    for (const Touch& touch : m_touches) {
+        if (touch.impulse.isZero(0.0)) continue;
+        double& most = speeds[touch.contact.body];
+        for (int k = 0; k < 3; ++k)
+            if (touch.contact.weights[k] > 0.0)
+                most = std::max(
+                    {most, a.col(globalVertex(touch.contact, k)).norm(), b.col(globalVertex(touch.contact, k)).norm()});
+    }
+    return speeds;
+}
+
 void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
     m_memory.clear();
     m_memoryStep = m_input.h;
@@ -507,7 +521,7 @@ void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
             impulses.push_back({touch.contact, touch.impulse, touch.sticks || creeps(touch), touch.slide});
         // Vertices that come and go in a sliding sheet are not without friction in the step in which they come back.
         const bool maySlideOn = isQuick() && touch.contact.isVertex() && touch.slip.known;
-        if (pushes || maySlideOn)
+        if ((pushes || maySlideOn) && !m_forgotten.count(touch.contact.body))
             m_memory[keyOf(touch.contact)] = {pushes ? touch.normalImpulse : 0.0,
                                               pushes ? touch.offset : 0.0,
                                               touch.sticks,

@@ -54,6 +54,10 @@ class ContactResponse {
     void pushOut(Points& v, std::vector<ContactImpulse>& impulses);
     /// Contacts that carried an impulse; remembers them for the next step.
     void finish(std::vector<ContactImpulse>& impulses);
+    /// Of each body the speed of the fastest vertex that touched it in the last solve, by either velocities, -1: none.
+    std::vector<double> speedsBeside(const Points& a, const Points& b) const;
+    /// What finish remembers then is not of this body.
+    void forget(int body) { m_forgotten.insert(body); }
     double slop() const { return m_vertexSlop; }
     bool hasFastBody() const { return m_anyFast; }
     /// Whether a fast body goes through a shell with these velocities.
@@ -156,7 +160,9 @@ class ContactResponse {
     void relaxDamping();
     void dropExcessFriction();
     double updateSticking(Touch& touch, double matters, double stiffness) const;
-    double updateSliding(Touch& touch, double matters) const;
+    double updateSliding(Touch& touch, double matters, double stiffness) const;
+    double bodyInertia(const Touch& touch, const Vec3& t) const;
+    bool wouldTurn(const Touch& touch, double limit, double stiffness) const;
     void updateCreeping(Touch& touch) const;
     bool creeps(const Touch& touch) const { return isQuick() && touch.slip.known && touch.slide.norm() <= m_creep; }
     double slowest() const { return 1e-3 * m_input.h * std::max(m_input.gravity.norm(), 1e-3); }
