@@ -46,6 +46,11 @@ Vec3 contactArm(const IslandInput& input, const Contact& contact) {
     return arm;
 }
 
+/// By how much damping makes a mass harder to move.
+double damping(const IslandInput& input, const Shell& shell) {
+    return 1.0 + input.h * shell.material().massDamping;
+}
+
 }  // namespace
 
 struct IslandSolver::Impl {
@@ -95,6 +100,7 @@ struct IslandSolver::Impl {
     void store(const IslandInput& input, StepReport& report);
     void pushOut(const IslandInput& input, StepReport& report);
     void balance(const IslandInput& input, std::vector<ContactImpulse>& impulses);
+    void shift(const IslandInput& input, const std::vector<Vec3>& onShells, std::vector<ContactImpulse>& impulses);
 };
 
 IslandSolver::IslandSolver() : m_impl(std::make_unique<Impl>()) {}
@@ -602,18 +608,37 @@ void IslandSolver::Impl::balance(const IslandInput& input, std::vector<ContactIm
         impulse -= missing * (impulse.norm() / pressed[contact.body]);
         onShells[contact.shell] += impulse;
     }
+    shift(input, onShells, impulses);
+}
+
+/// The shells' part of it. What walls hold stays where it was held: that walls must take.
+void IslandSolver::Impl::shift(const IslandInput& input, const std::vector<Vec3>& onShells,
+                               std::vector<ContactImpulse>& impulses) {
     Points solvedV;  // `v` may have been cut short since
     system.velocities(u, solvedV);
+    std::vector<Vec3> by(input.shells.size(), Vec3::Zero());
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         if (shell.pinCount() > 0) continue;
-        auto vk = v.middleCols(offsets[k], shell.vertexCount());
         Vec3 solved = -unfiltered.middleCols(offsets[k], shell.vertexCount()).rowwise().sum();
         for (const auto& row : system.rows())
             if (row.vertices[0] >= offsets[k] && row.vertices[0] < offsets[k] + shell.vertexCount())
                 solved += system.rowImpulse(row, solvedV, u.w);
-        const double mass = shell.masses().sum() * (1.0 + input.h * shell.material().massDamping);
-        vk.colwise() += ((onShells[k] - impulseShare * solved) / mass).eval();
+        by[k] = (onShells[k] - impulseShare * solved) / (shell.masses().sum() * damping(input, shell));
+        v.middleCols(offsets[k], shell.vertexCount()).colwise() += by[k];
+    }
+    std::vector<char> isBack(v.cols(), 0);
+    for (auto& [contact, impulse, sticks, slip] : impulses) {
+        const int vertex = offsets[contact.shell] + contact.vertices[0];
+        const VertexConstraint* held = contact.isVertex() ? system.constraintOf(vertex) : nullptr;
+        if (!held || !input.bodies[contact.body].prescribed || isBack[vertex]) continue;
+        isBack[vertex] = 1;
+        const Shell& shell = *input.shells[contact.shell];
+        const Vec3 back = (held->free - Mat3::Identity()) * by[contact.shell];
+        const Vec3 taken = shell.masses()[contact.vertices[0]] * damping(input, shell) * back;
+        v.col(vertex) += back;
+        impulse += taken;
+        input.bodies[contact.body].impulse -= pointImpulse(taken, contactArm(input, contact));
     }
 }
 

@@ -22,6 +22,12 @@ bool isCovered(const SurfacePoint& surface, const SurfacePoint& nearer) {
     return !isAbove(surface.point, nearer);
 }
 
+/// Whether two surfaces meet in a ridge, not in a valley. Nearest points may both be on the line where they meet, so
+/// both are asked.
+bool isOverRidge(const SurfacePoint& a, const SurfacePoint& b) {
+    return !isAbove(a.point, b) && !isAbove(b.point, a);
+}
+
 /// Bounds of a piece, in the world.
 void worldBounds(const ConvexPiece& piece, const Frame& frame, Vec3& lower, Vec3& upper) {
     const Vec3 centre = 0.5 * (piece.lower() + piece.upper()), half = 0.5 * (piece.upper() - piece.lower());
@@ -203,25 +209,25 @@ std::vector<int> ShellContacts::sidesOf(Sides& known, std::vector<SurfacePoint>&
             return std::lexicographical_compare(a.normal.data(), a.normal.data() + 3, b.normal.data(),
                                                 b.normal.data() + 3);
         });
-    std::vector<int> sides;
-    for (const SurfacePoint& surface : surfaces) {
-        const auto isFree = [&](int side) { return std::find(sides.begin(), sides.end(), side) == sides.end(); };
-        int best = -1, crossed = -1;
+    const int knownCount = int(known.size());
+    std::vector<int> sides(surfaces.size(), -1);
+    const auto isFree = [&](int side) { return std::find(sides.begin(), sides.end(), side) == sides.end(); };
+    for (std::size_t i = 0; i < surfaces.size(); ++i) {
         double most = kSameSide;
-        for (int side = 0; side < int(known.size()); ++side) {
-            if (!isFree(side)) continue;
-            const double along = known[side].normal.dot(surface.normal);
-            if (along > most) best = side, most = along;
-            if (!isAbove(surface.point, known[side])) crossed = side;
+        for (int side = 0; side < knownCount; ++side) {
+            const double along = known[side].normal.dot(surfaces[i].normal);
+            if (along > most && isFree(side)) sides[i] = side, most = along;
         }
-        if (best < 0) best = crossed;
-        if (best < 0) {
-            best = int(known.size());
-            known.push_back(surface);
-        }
-        known[best] = surface;
-        sides.push_back(best);
     }
+    for (std::size_t i = 0; i < surfaces.size(); ++i) {  // after them: a side that is still there was not left
+        for (int side = 0; side < knownCount && sides[i] < 0; ++side)
+            if (isFree(side) && isOverRidge(surfaces[i], known[side])) sides[i] = side;
+        if (sides[i] < 0) {
+            sides[i] = int(known.size());
+            known.push_back(surfaces[i]);
+        }
+    }
+    for (std::size_t i = 0; i < surfaces.size(); ++i) known[sides[i]] = surfaces[i];
     return sides;
 }
 

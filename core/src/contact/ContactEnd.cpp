@@ -10,6 +10,7 @@ constexpr double kMostOffset =
     0.15;                            // of an edge: how far vertices are lifted off a curved body for their chords' sake
 constexpr double kDeep = 0.1;        // of an edge: what is worth another solve where few are made
 constexpr double kMostPush = 0.2;    // of an edge: how far pushOut goes
+constexpr int kMostTurns = 8;        // of the walls of a valley, at pushing
 constexpr double kSamePoint = 0.15;  // of an edge: how far it may move in a round
 constexpr int kFreezeRound = 7;      // from here on normals stay: a triangle that tips to and fro would never settle
 
@@ -216,41 +217,101 @@ double ContactResponse::endGap(const Touch& touch, const IslandVelocities& solve
 }
 
 /// What few rounds have left inside a body is pushed out of it along the normal. A sheet gives way to that nearly for
-/// nothing; a stiff one feels it in the next step.
+/// nothing; a stiff one feels it in the next step. In a valley one wall pushes a vertex into the other, so that all
+/// have their turn several times.
 void ContactResponse::pushOut(Points& v, std::vector<ContactImpulse>& impulses) {
     if (!m_input.contacts || !isQuick()) return;
+    std::vector<Push> pushes = whatToPush(v);
     std::map<int, Vec3> moved;
+    for (int turn = 0; turn < kMostTurns; ++turn) {
+        bool isInside = false;
+        for (Push& one : pushes) isInside |= push(one, moved);
+        if (!isInside) break;
+    }
     m_deepestGap = 0.0;
-    for (const Contact& contact : m_found) {
-        const double lacks = missing(contact, touchOf(contact));
-        if (lacks > -(contact.isVertex() ? m_vertexSlop : m_faceSlop)) continue;
-        const double by = std::min(-lacks, kMostPush * m_edge[contact.shell]);
-        m_deepestGap = std::min(m_deepestGap, lacks + by);
-        const Vec3 impulse = push(contact, by, moved);
-        if (impulse.isZero(0.0)) continue;
-        impulses.push_back({contact, impulse, false, Vec3::Zero()});
-        if (contact.isVertex()) m_memory[keyOf(contact)] = {impulse.norm(), 0.0, false, {}, contact.point, true};
+    for (const Push& one : pushes) {
+        const Contact& contact = *one.contact;
+        m_deepestGap = std::min(m_deepestGap, one.left);
+        if (one.impulse == 0.0) continue;
+        impulses.push_back({contact, one.impulse * contact.normal, false, Vec3::Zero()});
+        if (contact.isVertex()) m_memory[keyOf(contact)] = {one.impulse, 0.0, false, {}, contact.point, true};
     }
     for (const auto& [vertex, by] : moved) v.col(vertex) += by / m_input.h;
 }
 
-/// The impulse that moves a contact's point out along its normal, besides what its vertices have been moved by [N s].
-Vec3 ContactResponse::push(const Contact& contact, double by, std::map<int, Vec3>& moved) const {
-    const int corners = contact.isVertex() ? 1 : 3;
-    for (int a = 0; a < corners; ++a)
-        if (contact.weights[a] > 0.0 && m_held[globalVertex(contact, a)]) return Vec3::Zero();
+/// What ends inside a body, and the other walls near the same vertices. Velocities may have changed since the end of
+/// the step was looked at.
+std::vector<ContactResponse::Push> ContactResponse::whatToPush(const Points& v) const {
+    std::vector<Push> pushes;
+    std::set<int> found;
+    std::multimap<int, const Contact*> near;  // of each vertex
+    for (const Contact& contact : m_found) {
+        const int touch = touchOf(contact);
+        double lacks = missing(contact, touch);
+        for (int a = 0; a < 3; ++a) lacks += contact.weights[a] * contact.normal.dot(sinceFound(contact, a, v));
+        if (lacks > -(contact.isVertex() ? m_vertexSlop : m_faceSlop) || isHeld(contact)) continue;
+        const double by = std::min(-lacks, kMostPush * m_edge[contact.shell]);
+        pushes.push_back({&contact, by, lacks + by});
+        if (touch >= 0) found.insert(touch);
+        for (int a = 0; a < (contact.isVertex() ? 1 : 3); ++a) near.emplace(globalVertex(contact, a), &contact);
+    }
+    for (int i = 0; i < static_cast<int>(m_touches.size()); ++i) {
+        const Contact& contact = m_touches[i].contact;
+        const int vertex = globalVertex(contact, 0);
+        if (!contact.isVertex() || found.count(i) > 0 || m_held[vertex]) continue;
+        const double gap = gapBefore(m_touches[i]);
+        const auto [first, last] = near.equal_range(vertex);
+        const bool isValley = std::any_of(first, last, [&](const auto& other) {
+            return other.second->normal.dot(contact.point - other.second->point) > 0.0;
+        });
+        if (gap < -m_vertexSlop && !isValley) continue;  // off the wall's end
+        const double lacks = gap + contact.normal.dot(sinceFound(contact, 0, v));
+        const double by = std::min(-lacks, kMostPush * m_edge[contact.shell]);
+        if (first != last || lacks < -m_vertexSlop) pushes.push_back({&contact, by});
+    }
+    return pushes;
+}
+
+/// How far a vertex ends from a wall that the start found, or that holds it, as m_found saw the end; infinite where
+/// that is not known [m].
+double ContactResponse::gapBefore(const Touch& touch) const {
+    const Contact& contact = touch.contact;
+    const Vec3 move = m_end[contact.shell].col(contact.vertices[0]) -
+                      m_input.shells[contact.shell]->positions().col(contact.vertices[0]) - m_input.h * touch.carried;
+    const double gap = touch.startGap + move.dot(contact.normal) - touch.offset - touch.allowedGap;
+    if (!std::isnan(gap)) return gap;
+    return touch.active ? 0.0 : std::numeric_limits<double>::infinity();
+}
+
+/// How a corner of a contact moves besides what m_found saw.
+Vec3 ContactResponse::sinceFound(const Contact& contact, int corner, const Points& v) const {
+    const int i = contact.vertices[corner], column = globalVertex(contact, corner);
+    return m_input.shells[contact.shell]->positions().col(i) + m_input.h * v.col(column) + m_y->col(column) -
+           m_end[contact.shell].col(i);
+}
+
+bool ContactResponse::isHeld(const Contact& contact) const {
+    for (int a = 0; a < 3; ++a)
+        if (contact.weights[a] > 0.0 && m_held[globalVertex(contact, a)]) return true;
+    return false;
+}
+
+/// Moves a contact's point out along its normal, besides what its vertices have been moved by. Whether it had to.
+bool ContactResponse::push(Push& one, std::map<int, Vec3>& moved) const {
+    const Contact& contact = *one.contact;
     const Shell& shell = *m_input.shells[contact.shell];
     const double damped = 1.0 + m_input.h * shell.material().massDamping;
-    double impulse = 0.0;
-    for (int a = 0; a < corners; ++a) {
+    bool isInside = false;
+    for (int a = 0; a < (contact.isVertex() ? 1 : 3); ++a) {
         if (contact.weights[a] == 0.0) continue;
         Vec3& before = moved.try_emplace(globalVertex(contact, a), Vec3::Zero()).first->second;
-        const double missing = by * contact.weights[a] / contact.weights.squaredNorm() - before.dot(contact.normal);
+        const double missing = one.by * contact.weights[a] / contact.weights.squaredNorm() - before.dot(contact.normal);
         if (missing <= 0.0) continue;
+        isInside |= missing > m_vertexSlop;
         before += missing * contact.normal;
-        impulse += shell.masses()[contact.vertices[a]] * damped * missing / m_input.h;
+        one.impulse += shell.masses()[contact.vertices[a]] * damped * missing / m_input.h;
     }
-    return impulse * contact.normal;
+    return isInside;
 }
 
 }  // namespace jacket

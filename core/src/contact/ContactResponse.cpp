@@ -239,8 +239,7 @@ double ContactResponse::timeOfTouch(const Touch& touch) const {
 void ContactResponse::alter(Touch& touch, Points& y) const {
     const Contact& c = touch.contact;
     const double by = std::min(-kAlteration * c.gap, kAlteration * m_edge[c.shell]);
-    for (int a = 0; a < 3; ++a)
-        if (c.weights[a] > 0.0 && m_held[globalVertex(c, a)]) return;
+    if (isHeld(c)) return;
     const double spread = c.weights.squaredNorm();
     for (int a = 0; a < (c.isVertex() ? 1 : 3); ++a) {
         auto column = y.col(globalVertex(c, a));

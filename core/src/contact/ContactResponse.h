@@ -100,6 +100,13 @@ class ContactResponse {
     };
     static constexpr Care kInFull{kMaxRounds, 1e-3};
     static constexpr Care kAmongWalls{6, 0.02};
+    /// What a contact's point is moved by, along the normal, at the end of the step.
+    struct Push {
+        const Contact* contact;
+        double by;             ///< at least; < 0: there is room [m]
+        double left = 0.0;     ///< gap that remains then [m]
+        double impulse = 0.0;  ///< that it took [N s]
+    };
     using Key = std::tuple<const void*, const void*, int>;  ///< shell, body, feature
     struct Memory {
         double impulse, offset;
@@ -169,7 +176,11 @@ class ContactResponse {
     bool isAmongWalls() const;
     double creepSpeed() const;
     void findAtEnd(const IslandVelocities& solved, const Points& y);
-    Vec3 push(const Contact& contact, double by, std::map<int, Vec3>& moved) const;
+    std::vector<Push> whatToPush(const Points& v) const;
+    double gapBefore(const Touch& touch) const;
+    Vec3 sinceFound(const Contact& contact, int corner, const Points& v) const;
+    bool push(Push& one, std::map<int, Vec3>& moved) const;
+    bool isHeld(const Contact& contact) const;
     bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
     int touchOf(const Contact& contact) const;
     bool closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round);
