@@ -1,35 +1,28 @@
 // What shells cost that do nothing: sheets asleep on a floor, beside the same world without them.
 #include <benchmark/benchmark.h>
-#include <jacket/testing.h>
-
 #include <cmath>
 
-namespace jacket::bullet {
+#include "support/BulletScene.h"
+
+namespace jacket::bullet::testing {
 namespace {
 
 constexpr double kStep = 1.0 / 60;
 
-ShellMaterial cloth() {
-    ShellMaterial m{.young = 3.03e7, .poisson = 0.3, .thickness = 3.3e-4, .density = 909.0};
-    m.stretchStiffnessOverride = 1e4;
-    m.bendingStiffnessOverride = 1e-4;
-    return m;
-}
-
 /// A floor with sheets of 5 x 5 vertices side by side.
-void fill(jacket::testing::Scene<>& scene, int sheets) {
+void fill(BulletScene& scene, int sheets) {
     scene.addBox(btVector3(1000, 1, 1000), 0, btVector3(0, -1, 0));
     const int side = int(std::ceil(std::sqrt(double(sheets))));
     for (int i = 0; i < sheets; ++i) {
-        TriangleMesh mesh = makeGrid({.size = {0.4, 0.4}, .cells = {4, 4}});
-        mesh.positions.colwise() += Vec3(0.6 * (i % side), 1.7e-4, 0.6 * (i / side));
-        scene.shells->add(mesh, cloth());
+        TriangleMesh mesh = squareSheet(0.4, 4);
+        mesh.positions.colwise() += Vec3(0.6 * (i % side), 4e-4, 0.6 * (i / side));
+        scene.shells->add(mesh, trampolineCloth());
     }
 }
 
 void sleepingShells(benchmark::State& state) {
     const int sheets = int(state.range(0));
-    jacket::testing::Scene<> scene;
+    BulletScene scene;
     fill(scene, sheets);
     for (int second = 0; second < 10 && (second == 0 || scene.shells->lastStep().awake > 0); ++second)
         scene.run(1.0, kStep);
@@ -42,6 +35,6 @@ void sleepingShells(benchmark::State& state) {
 BENCHMARK(sleepingShells)->Arg(0)->Arg(1)->Arg(10)->Arg(100)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
-}  // namespace jacket::bullet
+}  // namespace jacket::bullet::testing
 
 BENCHMARK_MAIN();

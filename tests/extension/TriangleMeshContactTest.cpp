@@ -11,28 +11,12 @@
 #include <functional>
 #include <numbers>
 
-#include "support/BulletScene.h"
+#include "support/HardScenes.h"
 
 namespace jacket::bullet::testing {
 namespace {
 
 constexpr double kStep = 1.0 / 120;
-
-/// A triangulated surface y = height(x, z) over a square of given side about the origin, facing up.
-std::unique_ptr<btTriangleMesh> surfaceMesh(double side, int cells, const std::function<double(double, double)>& height,
-                                            double unit = 1.0) {
-    auto mesh = std::make_unique<btTriangleMesh>();
-    const auto at = [&](int i, int j) {
-        const double x = side * (double(i) / cells - 0.5), z = side * (double(j) / cells - 0.5);
-        return btVector3(btScalar(x / unit), btScalar(height(x, z) / unit), btScalar(z / unit));
-    };
-    for (int i = 0; i < cells; ++i)
-        for (int j = 0; j < cells; ++j) {
-            mesh->addTriangle(at(i, j), at(i, j + 1), at(i + 1, j + 1));
-            mesh->addTriangle(at(i, j), at(i + 1, j + 1), at(i + 1, j));
-        }
-    return mesh;
-}
 
 double flat(double, double) {
     return 0.0;
@@ -48,12 +32,6 @@ Vec3 contactForce(const ShellBody& sheet, double h) {
     return sum;
 }
 
-void place(ShellBody& sheet, const Vec3& by) {
-    std::vector<btVector3> x(sheet.positions().begin(), sheet.positions().end());
-    for (btVector3& p : x) p += btVector3(btScalar(by.x()), btScalar(by.y()), btScalar(by.z()));
-    sheet.setPositions(x);
-}
-
 /// The contact forces of some steps, so that a residual shake averages out, against the weight.
 void expectWeightIsBorne(BulletScene& scene, ShellBody& sheet, double tolerance) {
     Vec3 mean = Vec3::Zero();
@@ -63,12 +41,6 @@ void expectWeightIsBorne(BulletScene& scene, ShellBody& sheet, double tolerance)
         mean += contactForce(sheet, kStep) / steps;
     }
     EXPECT_LT((mean - Vec3(0, weightOf(sheet), 0)).norm(), tolerance * weightOf(sheet)) << mean.transpose();
-}
-
-double lowestClearance(const ShellBody& sheet, const std::function<double(double, double)>& height) {
-    double lowest = 1e9;
-    for (const auto& p : sheet.shell().positions().colwise()) lowest = std::min(lowest, p.y() - height(p.x(), p.z()));
-    return lowest;
 }
 
 // ------------------------------------------------------------------------------------------------------------ floors
@@ -193,40 +165,13 @@ TEST(TriangleMesh, IsOneSided) {
 
 // ------------------------------------------------------------------------------------------------------ hills, valleys
 
-double hill(double x, double z) {
-    return 0.15 * std::exp(-(x * x + z * z) / 0.08);
-}
-
 /// Where normals turn from step to step; started a little aside, by multiples of 3.7e-9 m, as a step's rounding would.
 class Heightfield : public ::testing::TestWithParam<int> {};
 
 TEST_P(Heightfield, AClothDrapesOverAHill) {
-    const int n = 41;
-    std::vector<float> heights(n * n);
-    for (int j = 0; j < n; ++j)
-        for (int i = 0; i < n; ++i) heights[j * n + i] = float(hill(0.04 * i - 0.8, 0.04 * j - 0.8));
-    auto shape = std::make_unique<btHeightfieldTerrainShape>(n, n, heights.data(), btScalar(-1), btScalar(1), 1, false);
-    shape->setLocalScaling(btVector3(btScalar(0.04), 1, btScalar(0.04)));
-    BulletScene scene;
-    scene.addBody(std::move(shape), 0, btVector3(0, 0, 0));
-    auto& sheet = scene.shells->add(squareSheet(0.8, 16), trampolineCloth());
-    place(sheet, {0.01 + 3.7e-9 * GetParam(), 0.17, 0.02});
-    // The surface between the grid's points, with the diagonal that Bullet draws: from (i, j + 1) to (i + 1, j).
-    const auto surface = [&](double x, double z) {
-        const double u = (x + 0.8) / 0.04, v = (z + 0.8) / 0.04;
-        const int i = std::clamp(int(u), 0, n - 2), j = std::clamp(int(v), 0, n - 2);
-        const double a = u - i, b = v - j;
-        const auto h = [&](int di, int dj) { return double(heights[(j + dj) * n + i + di]); };
-        return a + b <= 1 ? h(0, 0) + a * (h(1, 0) - h(0, 0)) + b * (h(0, 1) - h(0, 0))
-                          : h(1, 1) + (1 - a) * (h(0, 1) - h(1, 1)) + (1 - b) * (h(1, 0) - h(1, 1));
-    };
-    double lowest = 1e9;
-    for (int i = 0; i < 180; ++i) {
-        scene.step(kStep);
-        lowest = std::min(lowest, lowestClearance(sheet, surface));
-    }
-    EXPECT_GT(lowest, -bulletTolerance(1e-4, 1e-3));
-    EXPECT_LT(sheet.positions()[0].y(), 0.05);  // a corner has come down
+    HillScene scene(3.7e-9 * GetParam());
+    EXPECT_GT(scene.lowest(), -bulletTolerance(1e-4, 1e-3));
+    EXPECT_LT(scene.sheet.positions()[0].y(), 0.05);  // a corner has come down
     EXPECT_EQ(scene.shells->lastStep().rejectedSteps, 0);
 }
 INSTANTIATE_TEST_SUITE_P(Starts, Heightfield, ::testing::Values(0, 27, 37, 51));
@@ -256,22 +201,12 @@ class Valley : public ::testing::TestWithParam<std::tuple<double, double>> {};
 
 TEST_P(Valley, HoldsASheetWithoutLettingItSink) {
     const auto [angle, aside] = GetParam();
-    const double slope = 1.0 / std::tan(angle / 2 * std::numbers::pi / 180);
-    const auto height = [&](double x, double) { return slope * std::abs(x); };
-    const auto mesh = surfaceMesh(2, 2, height);
-    BulletScene scene;
-    scene.addBody(std::make_unique<btBvhTriangleMeshShape>(mesh.get(), true), 0, btVector3(0, 0, 0));
-    auto& sheet = scene.shells->add(squareSheet(0.4, 8), trampolineCloth(), {.friction = 0.1});
-    place(sheet, {aside, 0.21 * slope, 0.0});
-    double lowest = 1e9;
-    for (int i = 0; i < 240; ++i) {
-        scene.step(kStep);
-        lowest = std::min(lowest, lowestClearance(sheet, height));
-    }
+    ValleyScene scene(angle, aside);
+    const double lowest = scene.lowest();
     EXPECT_GT(lowest, -2e-4);  // wanted: 1e-4; of 60 starts up to 2e-5 m aside one in 90 degrees is 1.3e-4 deep
     EXPECT_LT(lowest, 0.01);
     EXPECT_TRUE(scene.shells->lastStep().finite);
-    expectWeightIsBorne(scene, sheet, 0.02);  // cloth on smooth walls does not come quite to rest
+    expectWeightIsBorne(scene, scene.sheet, 0.02);  // cloth on smooth walls does not come quite to rest
 }
 INSTANTIATE_TEST_SUITE_P(Degrees, Valley,
                          ::testing::Combine(::testing::Values(60.0, 90.0, 120.0, 150.0, 165.0),

@@ -1,0 +1,99 @@
+// Scenes whose outcome a rounding can decide, from many starts that differ by less than a micrometre: how often they
+// end well, and how badly otherwise.
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "support/HardScenes.h"
+
+namespace jacket::bullet::testing {
+namespace {
+
+/// Metres beside the first start; every fifth a hundred times farther.
+double aside(int start) {
+    return 3.7e-9 * start * (start % 5 == 4 ? 100 : 1);
+}
+
+std::vector<double> sorted(std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    return values;
+}
+
+void clearance(const char* scene, int starts, const std::function<double(double)>& lowest) {
+    constexpr double kDeep = -1e-4;
+    std::vector<double> found;
+    for (int i = 0; i < starts; ++i) found.push_back(lowest(aside(i)));
+    found = sorted(std::move(found));
+    const auto deep = std::lower_bound(found.begin(), found.end(), kDeep) - found.begin();
+    std::printf("%-28s %3d of %d deeper than 0.1 mm; least clearance %9.3g mm, median %.3g mm\n", scene, int(deep),
+                starts, 1e3 * found.front(), 1e3 * found[found.size() / 2]);
+}
+
+/// Until it sleeps, 8 s at most.
+void stack(int count, double h, int starts) {
+    constexpr double kLimit = 8.0;  // [s]
+    std::vector<double> crept, times;
+    int toppled = 0;
+    for (int i = 0; i < starts; ++i) {
+        StackScene scene(count, aside(i));
+        double t = 0.0;
+        for (; t < kLimit && !scene.cloth.isAsleep(); t += h) scene.step(h);
+        if (scene.cloth.isAsleep()) times.push_back(t);
+        crept.push_back(scene.crept(count - 1));
+        toppled += scene.upright(count - 1) < 0.999;
+    }
+    crept = sorted(std::move(crept));
+    times = sorted(std::move(times));
+    std::printf(
+        "%d boxes on a cloth, 1/%-3.0f s    %3d of %d sleep within %g s, median %.3g s; %d toppled; crept %.3g mm, "
+        "median %.3g mm\n",
+        count, 1.0 / h, int(times.size()), starts, kLimit, times.empty() ? kLimit : times[times.size() / 2], toppled,
+        1e3 * crept.back(), 1e3 * crept[crept.size() / 2]);
+}
+
+/// A ball far lighter than a vertex, dropped on a trampoline in steps of 1/10 s: its energy over what it fell with.
+void lightBall(double ratio, int starts) {
+    constexpr double h = 0.1;
+    std::vector<double> gains;
+    for (int i = 0; i < starts; ++i) {
+        BulletScene scene;
+        const double height = 1.0 + 0.01 * i, mass = ratio * 0.3 * 4.0 / 400;
+        auto& ball = scene.addSphere(0.25, mass, btVector3(btScalar(0.003 * (i % 7)), btScalar(height), 0));
+        pinBorder(scene.shells->add(squareSheet(2, 20), trampolineCloth()));
+        double most = 0.0;
+        for (double t = 0; t < 2.0; t += h) {
+            scene.step(h);
+            const double rise = std::max(0.0, double(ball.getLinearVelocity().y()) - 9.81 * h);
+            most = std::max(most, 0.5 * rise * rise + 9.81 * double(ball.getWorldTransform().getOrigin().y()));
+        }
+        gains.push_back(most / (9.81 * height + 0.5 * 9.81 * 9.81 * h * h));
+    }
+    gains = sorted(std::move(gains));
+    const auto thrown = gains.end() - std::upper_bound(gains.begin(), gains.end(), 1.0 + 1e-6);
+    std::printf("ball of %-5g vertex masses     %3d of %d thrown; most energy %.3g of what it fell with\n", ratio,
+                int(thrown), starts, gains.back());
+}
+
+void runAll(int starts) {
+    clearance("cloth on a hill", starts, [](double x) { return HillScene(x).lowest(); });
+    for (const double angle : {60.0, 90.0, 120.0})
+        clearance(("cloth in a valley, " + std::to_string(int(angle)) + " deg").c_str(), starts,
+                  [&](double x) { return ValleyScene(angle, x).lowest(); });
+    for (const int count : {2, 3})
+        for (const double h : {1.0 / 60, 1.0 / 240}) stack(count, h, starts);
+    for (const double ratio : {1e-3, 1e-2, 1.0}) lightBall(ratio, starts);
+}
+
+}  // namespace
+}  // namespace jacket::bullet::testing
+
+int main(int argc, char** argv) {
+    const int starts = argc > 1 ? std::atoi(argv[1]) : 20;
+    if (argc > 2 || starts < 1) {
+        std::fprintf(stderr, "usage: starts_bench [STARTS]\n  STARTS  how many, > 0; 20 if not given\n");
+        return 2;
+    }
+    jacket::bullet::testing::runAll(starts);
+}
