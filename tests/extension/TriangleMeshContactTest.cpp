@@ -174,7 +174,7 @@ TEST_P(Heightfield, AClothDrapesOverAHill) {
     EXPECT_LT(scene.sheet.positions()[0].y(), 0.05);  // a corner has come down
     EXPECT_EQ(scene.shells->lastStep().rejectedSteps, 0);
 }
-INSTANTIATE_TEST_SUITE_P(Starts, Heightfield, ::testing::Values(0, 27, 37, 51));
+INSTANTIATE_TEST_SUITE_P(Starts, Heightfield, ::testing::Values(0, 27));
 
 TEST(EditedHeightfield, LiftsWhatLiesOnIt) {
     std::vector<float> heights(21 * 21, 0.0f);
@@ -210,7 +210,7 @@ TEST_P(Valley, HoldsASheetWithoutLettingItSink) {
 }
 INSTANTIATE_TEST_SUITE_P(Degrees, Valley,
                          ::testing::Combine(::testing::Values(60.0, 90.0, 120.0, 150.0, 165.0),
-                                            ::testing::Values(0.0, 1e-11, 1e-9, 1e-7)));
+                                            ::testing::Values(0.0, 1e-9)));
 
 // -------------------------------------------------------------------------------------- parts smaller than a triangle
 
