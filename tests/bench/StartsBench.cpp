@@ -1,5 +1,6 @@
 // Scenes whose outcome a rounding can decide, from many starts that differ by less than a micrometre: how often they
 // end well, and how badly otherwise.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
@@ -53,7 +54,7 @@ void stack(int count, double h, int starts) {
         1e3 * crept.back(), 1e3 * crept[crept.size() / 2]);
 }
 
-/// A ball far lighter than a vertex, dropped on a trampoline in steps of 1/10 s: its energy over what it fell with.
+/// A ball of `ratio` vertex masses, dropped on a trampoline in steps of 1/10 s: its energy over what it fell with.
 void lightBall(double ratio, int starts) {
     constexpr double h = 0.1;
     std::vector<double> gains;
