@@ -87,6 +87,7 @@ struct IslandSolver::Impl {
     bool bodiesLead(const IslandInput& input) const;
     void limitDeformation(const IslandInput& input, StepReport& report);
     void blend(const IslandInput& input, const Points& other);
+    void coast(const IslandInput& input, const Points& coasting);
     double shareWithin(const CoupledBody& body, int dynamic, double speed) const;
     void limitBodies(const IslandInput& input, StepReport& report);
     Points rigidMotion(const IslandInput& input, const Points& velocities) const;
@@ -101,6 +102,8 @@ struct IslandSolver::Impl {
     void pushOut(const IslandInput& input, StepReport& report);
     void balance(const IslandInput& input, std::vector<ContactImpulse>& impulses);
     void shift(const IslandInput& input, const std::vector<Vec3>& onShells, std::vector<ContactImpulse>& impulses);
+    bool giveToWalls(const IslandInput& input, int shell, const Vec3& impulse,
+                     std::vector<ContactImpulse>& impulses) const;
 };
 
 IslandSolver::IslandSolver() : m_impl(std::make_unique<Impl>()) {}
@@ -207,8 +210,8 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
     }
     report.converged = report.converged && !toTheEnd;
     if (energyGain(input) > std::max(leastGain, kEnergyGain)) {
-        if (calmest.cols() > 0) v = calmest;
-        assemble(input, calmest.cols() > 0);  // back to what threw the shell about least
+        v = calmest.cols() > 0 ? calmest : expected;  // as it is now, it may be anything
+        assemble(input, calmest.cols() > 0);          // back to what threw the shell about least
         solveRounds(input, report);
     }
     const double mostGain = response.hasFastBody() && bodiesLead(input) ? kMostGainOfFast : kMostEnergyGain;
@@ -299,6 +302,7 @@ void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& 
         blend(input, coasting);
         impulseShare *= 0.5;
     }
+    if (!(energyGain(input) <= kEnergyGain)) coast(input, coasting);
     for (std::size_t b = 0; impulseShare < 1.0 && b < input.bodies.size(); ++b) response.forget(static_cast<int>(b));
 }
 
@@ -308,6 +312,14 @@ void IslandSolver::Impl::blend(const IslandInput& input, const Points& other) {
         for (int i = 0; i < input.shells[k]->vertexCount(); ++i)
             if (!input.shells[k]->isPinned(i))
                 v.col(offsets[k] + i) = 0.5 * (v.col(offsets[k] + i) + other.col(offsets[k] + i));
+}
+
+/// As if nothing had been solved: what was is so far off that no share of it can be used.
+void IslandSolver::Impl::coast(const IslandInput& input, const Points& coasting) {
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        for (int i = 0; i < input.shells[k]->vertexCount(); ++i)
+            if (!input.shells[k]->isPinned(i)) v.col(offsets[k] + i) = coasting.col(offsets[k] + i);
+    impulseShare = 0.0;
 }
 
 /// The rigid motion of each shell with the momentum of these velocities; none of shells that are held.
@@ -491,32 +503,29 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
     Eigen::Matrix<double, 6, Eigen::Dynamic> guessTwist = report.solves == 0 ? freeTwist : u.w;
     u.resize(static_cast<int>(start.cols()), system.bodyCount());
     int freshIterations = -1, lastIterations = 0;  // of the first solve with the present factor, and of the last one
-    double norm2 = 0.0;                            // what the tolerance is relative to
     bool roughly = response.isQuick() && response.hasContacts() && lastRounds > 1;
     int round = 0;
     for (;;) {
         LapTimer lap(input);
         response.writeTo(system);
         lap.addTo(times.contact);
-        if (freshIterations < 0 || lastIterations > 20 + 2 * freshIterations) {
+        const bool isNew =
+            freshIterations < 0 || system.precision() == Precision::Single || lastIterations > 20 + 2 * freshIterations;
+        if (isNew)
             preconditioner.build(system, settings.preconditioner);
-            freshIterations = -1;
-        } else {
+        else
             preconditioner.updateBodies(system);
-        }
         lap.addTo(times.factor);
-        if (freshIterations < 0 || !dynamicBodies.empty()) {
-            system.start(start, freeTwist, u);  // dv = 0
-            const double floor = floorOfReference(input, preconditioner.isCoarse(system) ? 1.0 : 0.1);
-            norm2 = std::max(pcg.begin(system, preconditioner, u), floor);
-        }
+        system.start(start, freeTwist, u);  // dv = 0
+        const double floor = floorOfReference(input, preconditioner.isCoarse(system) ? 1.0 : 0.1);
+        const double norm2 = std::max(pcg.begin(system, preconditioner, u), floor);  // the tolerance refers to it
         system.start(guess, guessTwist, u);
         const double rho = pcg.begin(system, preconditioner, u);
         double target2 = tolerance * tolerance * norm2;
         if (roughly) target2 = std::max(target2, std::min(kRough * kRough * norm2, kShare * kShare * rho));
         const PcgReport solve = pcg.finish(system, preconditioner, target2, 1.0, maxIterations, u);
         lastIterations = solve.iterations;
-        if (freshIterations < 0) freshIterations = solve.iterations;
+        if (isNew) freshIterations = solve.iterations;
         ++report.solves;
         report.pcgIterations += solve.iterations;
         report.residual = solve.residual * std::sqrt(target2 / norm2);
@@ -544,6 +553,7 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
 
 void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
     response.finish(report.contacts);
+    if (impulseShare == 0.0) report.contacts.clear();
     Eigen::Matrix<double, 6, Eigen::Dynamic> change;
     const Eigen::Matrix<double, 6, Eigen::Dynamic> twists = endTwists();
     system.momentum(twists - freeTwist, change);
@@ -611,12 +621,12 @@ void IslandSolver::Impl::balance(const IslandInput& input, std::vector<ContactIm
     shift(input, onShells, impulses);
 }
 
-/// The shells' part of it. What walls hold stays where it was held: that walls must take.
+/// The shells' part of it. Walls take what is missing: a shell that they hold is stiff, and its mass would turn little
+/// force into much speed. A shell that touches none moves by it.
 void IslandSolver::Impl::shift(const IslandInput& input, const std::vector<Vec3>& onShells,
                                std::vector<ContactImpulse>& impulses) {
     Points solvedV;  // `v` may have been cut short since
     system.velocities(u, solvedV);
-    std::vector<Vec3> by(input.shells.size(), Vec3::Zero());
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         if (shell.pinCount() > 0) continue;
@@ -624,22 +634,30 @@ void IslandSolver::Impl::shift(const IslandInput& input, const std::vector<Vec3>
         for (const auto& row : system.rows())
             if (row.vertices[0] >= offsets[k] && row.vertices[0] < offsets[k] + shell.vertexCount())
                 solved += system.rowImpulse(row, solvedV, u.w);
-        by[k] = (onShells[k] - impulseShare * solved) / (shell.masses().sum() * damping(input, shell));
-        v.middleCols(offsets[k], shell.vertexCount()).colwise() += by[k];
+        const Vec3 missing = impulseShare * solved - onShells[k];
+        if (giveToWalls(input, static_cast<int>(k), missing, impulses)) continue;
+        v.middleCols(offsets[k], shell.vertexCount()).colwise() -=
+            (missing / (shell.masses().sum() * damping(input, shell))).eval();
     }
-    std::vector<char> isBack(v.cols(), 0);
-    for (auto& [contact, impulse, sticks, slip] : impulses) {
-        const int vertex = offsets[contact.shell] + contact.vertices[0];
-        const VertexConstraint* held = contact.isVertex() ? system.constraintOf(vertex) : nullptr;
-        if (!held || !input.bodies[contact.body].prescribed || isBack[vertex]) continue;
-        isBack[vertex] = 1;
-        const Shell& shell = *input.shells[contact.shell];
-        const Vec3 back = (held->free - Mat3::Identity()) * by[contact.shell];
-        const Vec3 taken = shell.masses()[contact.vertices[0]] * damping(input, shell) * back;
-        v.col(vertex) += back;
-        impulse += taken;
-        input.bodies[contact.body].impulse -= pointImpulse(taken, contactArm(input, contact));
+}
+
+/// Adds an impulse to those that walls have given a shell; false if there are none.
+bool IslandSolver::Impl::giveToWalls(const IslandInput& input, int shell, const Vec3& impulse,
+                                     std::vector<ContactImpulse>& impulses) const {
+    const auto isWalls = [&](const ContactImpulse& one) {
+        return one.contact.shell == shell && input.bodies[one.contact.body].prescribed;
+    };
+    double pressed = 0.0;
+    for (const ContactImpulse& one : impulses)
+        if (isWalls(one)) pressed += one.impulse.norm();
+    if (!(pressed > 0.0)) return false;
+    for (ContactImpulse& one : impulses) {
+        if (!isWalls(one)) continue;
+        const Vec3 part = impulse * (one.impulse.norm() / pressed);
+        one.impulse += part;
+        input.bodies[one.contact.body].impulse -= pointImpulse(part, contactArm(input, one.contact));
     }
+    return true;
 }
 
 }  // namespace jacket

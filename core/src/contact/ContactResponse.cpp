@@ -90,7 +90,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     for (const auto& anchor : input.anchors) m_held[m_offsets[anchor.shell] + anchor.vertex] = 1;
     if (!input.contacts) return;
 
-    m_care = isAmongWalls() ? kAmongWalls : kInFull;
+    m_care = isAmongWalls() && !isAnyStiff() ? kAmongWalls : kInFull;
     m_creep = creepSpeed();
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);
     m_faceSlop = std::min(2e-4, 1e-2 * shortest);
@@ -120,12 +120,29 @@ bool ContactResponse::isAmongWalls() const {
                        [](const CoupledBody& b) { return b.prescribed && b.freeTwist.isZero(0.0); });
 }
 
+/// Side of a square with as many triangles of such edges as a shell has [m].
+double ContactResponse::side(std::size_t shell) const {
+    return m_edge[shell] * std::sqrt(0.5 * m_input.shells[shell]->mesh().triangleCount());
+}
+
+/// Whether a shell passes on what one of its corners feels to all of it within a few steps: it does not give way to
+/// being pushed out, but is thrown by it. Bending spreads over a length of (h^2 D / rho t)^1/4 in a step.
+bool ContactResponse::isAnyStiff() const {
+    constexpr double kLengths = 16.0;
+    for (std::size_t k = 0; k < m_edge.size(); ++k) {
+        const ShellMaterial& material = m_input.shells[k]->material();
+        const double length =
+            std::pow(m_input.h * m_input.h * material.bendingStiffness() / material.areaDensity(), 0.25);
+        if (side(k) < kLengths * length) return true;
+    }
+    return false;
+}
+
 /// A fifth of what a shell may creep that is held by friction, 1e-4 sqrt(g L), L: the side of a square of its size.
 double ContactResponse::creepSpeed() const {
-    double side = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k < m_edge.size(); ++k)
-        side = std::min(side, m_edge[k] * std::sqrt(0.5 * m_input.shells[k]->mesh().triangleCount()));
-    return 2e-5 * std::sqrt(std::max(m_input.gravity.norm(), 1e-3) * side);
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < m_edge.size(); ++k) least = std::min(least, side(k));
+    return 2e-5 * std::sqrt(std::max(m_input.gravity.norm(), 1e-3) * least);
 }
 
 void ContactResponse::addAtStart(const Contact& contact, const std::map<int, double>& room, Points& y) {

@@ -44,8 +44,8 @@ class ContactResponse {
     bool update(const CoupledSystem& system, const IslandVelocities& solved, const Points& y, int round, bool rough);
     /// Most negative gap that the last update predicted for the end of the step and that it wanted closed [m].
     double deepestGap() const { return m_deepestGap; }
-    /// Whether nothing rests on the contacts: they are then looked at once, after a rough solve, again only where a
-    /// vertex ends deep inside a body, and pushOut does what is left.
+    /// Whether nothing rests on the contacts and the shells give way: they are then looked at once, after a rough
+    /// solve, again only where a vertex ends deep inside a body, and pushOut does what is left.
     bool isQuick() const { return m_care.rounds < kMaxRounds; }
     /// Whether anything is near.
     bool hasContacts() const { return !m_touches.empty(); }
@@ -174,6 +174,8 @@ class ContactResponse {
     bool creeps(const Touch& touch) const { return isQuick() && touch.slip.known && touch.slide.norm() <= m_creep; }
     double slowest() const { return 1e-3 * m_input.h * std::max(m_input.gravity.norm(), 1e-3); }
     bool isAmongWalls() const;
+    double side(std::size_t shell) const;
+    bool isAnyStiff() const;
     double creepSpeed() const;
     void findAtEnd(const IslandVelocities& solved, const Points& y);
     std::vector<Push> whatToPush(const Points& v) const;

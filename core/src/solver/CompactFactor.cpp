@@ -168,7 +168,7 @@ CompactFactor::CompactFactor(const CompactMatrix& matrix)
 
 void CompactFactor::factor(const std::vector<Mat3>& diagonal, const std::vector<Mat3>& lower) {
     constexpr double kMostShift = 1e3;  // as good as block Jacobi; keeps the loop finite on garbage
-    m_shift *= 0.7;                     // let it shrink again when the breakdown is over
+    m_shift *= 0.9;  // let it shrink again when the breakdown is over; a factor cares little for its size
     if (m_shift < 1e-3) m_shift = 0.0;
     Factoring f{m_size,
                 m_vertexOf.data(),

@@ -9,8 +9,6 @@
 namespace jacket {
 namespace {
 
-constexpr int kLeastForCoarse = 300;  ///< vertices from which on a coarse space pays
-
 /// For every body the first body of its group.
 std::vector<int> groupLeaders(const CoupledSystem& system) {
     std::vector<int> leader(system.bodyCount());
@@ -56,7 +54,7 @@ void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t 
 
 void CoupledPreconditioner::buildCoarse(const CoupledSystem& system, const CoupledSystem::ShellPart& part) {
     CompactShell& compact = part.matrix->compact();
-    if (part.matrix->size() < kLeastForCoarse || !part.positions) return compact.coarse.reset();
+    if (!part.positions) return compact.coarse.reset();
     if (!compact.coarse) compact.coarse = std::make_unique<CoarseSpace>(compact.matrix);
     const int end = part.offset + part.matrix->size();
     const std::vector<int>& rowOf = compact.matrix.rowOf();

@@ -75,14 +75,19 @@ double FilteredPcg::begin(const CoupledSystem& system, const CoupledPrecondition
 PcgReport FilteredPcg::finish(const CoupledSystem& system, const CoupledPreconditioner& preconditioner,
                               double reference, double tolerance, int maxIterations, CoupledVector& u) {
     constexpr int kMostStarts = 5;
+    constexpr double kMostGrowth = 100.0;  // of r^T P^-1 r: beyond, rounding has led the iterations astray
     const bool isSingle = system.precision() == Precision::Single;
     const double target = tolerance * tolerance * reference;
     PcgReport report;
     for (int start = 0; start < kMostStarts && !(m_rho <= target) && report.iterations < maxIterations; ++start) {
         if (isSingle) {
+            const double before = m_rho;
+            m_before = u;
             iterateCompact(system, preconditioner, m_rho, target, maxIterations, report.iterations, u);
+            if (begin(system, preconditioner, u) <= kMostGrowth * before) continue;
+            u = m_before;
             begin(system, preconditioner, u);
-            continue;
+            break;
         }
         m_rho = iterate(system, preconditioner, m_rho, target, maxIterations, report.iterations, u);
         system.residual(u, m_r, m_unfiltered);

@@ -20,7 +20,7 @@ class FilteredPcg {
     double begin(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, const CoupledVector& u);
     /// After begin: improves u until r^T P^-1 r <= tolerance^2 reference. Of a system in single precision the
     /// iterations are; the residual that they end with is measured in double, and where it is not small enough they
-    /// start again from it.
+    /// start again from it. Where they have made it much worse, u is left as it was.
     PcgReport finish(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double reference,
                      double tolerance, int maxIterations, CoupledVector& u);
     /// All of it, from u.
@@ -39,7 +39,7 @@ class FilteredPcg {
                    int maxIterations, int& iterations, CoupledVector& u);
     void iterateCompact(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho,
                         double target, int maxIterations, int& iterations, CoupledVector& u);
-    CoupledVector m_r, m_z, m_d, m_q;
+    CoupledVector m_r, m_z, m_d, m_q, m_before;
     double m_rho = 0.0;  ///< r^T P^-1 r of m_r
     CompactVector m_compactR, m_compactZ, m_compactD, m_compactQ;
     std::vector<double> m_change;  ///< of u.s, four a vertex as in a CompactVector
