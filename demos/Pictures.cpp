@@ -77,7 +77,10 @@ Pictures::Pictures(const World& start, int every)
 }
 
 void Pictures::add(const World& world, int frame) {
-    if (frame % m_every != 0) return;
+    if (frame % m_every == 0) keep(world, frame);
+}
+
+void Pictures::keep(const World& world, int frame) {
     Moment moment{frame, {}, world.bodies()};
     for (int k = 0; k < world.shellCount(); ++k) moment.shells.push_back(world.shell(k).positions().cast<float>());
     m_moments.push_back(std::move(moment));

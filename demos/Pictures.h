@@ -12,8 +12,9 @@ namespace jacket::demo {
 /// sees all of them.
 class Pictures {
   public:
-    Pictures(const World& start, int every);  ///< every so many frames; the start is frame 0
-    void add(const World& world, int frame);  ///< keeps the frame if it is one to be drawn
+    Pictures(const World& start, int every);   ///< every so many frames; the start is frame 0
+    void add(const World& world, int frame);   ///< keeps the frame if it is one to be drawn
+    void keep(const World& world, int frame);  ///< keeps it in any case
 
     int count() const { return static_cast<int>(m_moments.size()); }
     /// The camera for all kept moments, with nothing before it.

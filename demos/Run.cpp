@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "Clocks.h"
+#include "GlbAnimation.h"
 #include "Pictures.h"
 #include "Profile.h"
 #include "Progress.h"
@@ -41,17 +42,20 @@ class Files {
         m_recorder.emplace(m_directory->folder(), start);
         if (output.pictureEvery > 0) m_pictures.emplace(start, output.pictureEvery);
         if (output.html) m_page.emplace(start);
+        if (output.glb) m_animation.emplace(start);
         m_size = readSize(output.size);
     }
     void add(const FrameRecord& frame, const World& world) {
         if (m_recorder) m_recorder->add(frame, world);
         if (m_pictures) m_pictures->add(world, frame.frame);
         if (m_page) m_page->add(world, frame.frame);
+        if (m_animation) m_animation->add(world, frame.frame);
     }
     void finish(const Json& result, Progress::Style style) {
         if (!m_directory) return;
         m_recorder->finish(result);
         if (m_page) writeText(m_directory->folder() / "view.html", m_page->html());
+        if (m_animation) writeAnimation(result);
         if (m_pictures) {
             Progress progress(std::cerr, style, "pictures", m_pictures->count());
             m_pictures->write(m_directory->folder() / "frames", m_size.width, m_size.height, [&](int drawn) {
@@ -61,12 +65,23 @@ class Files {
         }
         if (!interrupted) m_directory->commit();
     }
+    const std::string& animationSummary() const { return m_animationSummary; }  ///< what it keeps
 
   private:
+    void writeAnimation(const Json& result) {
+        const std::string glb = m_animation->glb();
+        writeText(m_directory->folder() / "anim.glb", glb);
+        m_animationSummary = std::to_string(m_animation->momentCount()) + " of " +
+                             std::to_string(result["frames"].get<int>() + 1) + " frames, " +
+                             std::to_string((glb.size() + 999) / 1000) + " kB";
+    }
+
     std::optional<OutputDirectory> m_directory;
     std::optional<Recorder> m_recorder;
     std::optional<Pictures> m_pictures;
     std::optional<ViewPage> m_page;
+    std::optional<GlbAnimation> m_animation;
+    std::string m_animationSummary;
     Size m_size{};
 };
 
@@ -112,6 +127,7 @@ void addOutputOptions(CLI::App& command, RunOutput& output) {
     command.add_option("--png", output.pictureEvery, "EVERY: a picture every so many frames, in DIR/frames");
     command.add_option("--size", output.size, "WIDTHxHEIGHT of the pictures; 960x720 if not given");
     command.add_flag("--html", output.html, "DIR/view.html: the motion in a browser, to be turned by mouse");
+    command.add_flag("--glb", output.glb, "DIR/anim.glb: the motion as glTF, for Blender and the like");
     command.add_flag("--profile", output.profile, "Where the time went: a table, and \"profile\" in result.json");
     command.add_option("--threads", output.threads, "Threads that solve; 1 is all there is");
     command.add_flag("--quiet", output.quiet, "No progress; with --out nothing at all");
@@ -126,6 +142,7 @@ void checkOutputOptions(const CLI::App& command, const RunOutput& output) {
     if (command.count("--size") && !command.count("--png"))
         throw InputError("--size needs --png: it is the pictures' size");
     if (output.html && output.out.empty()) throw InputError("--html needs --out DIR to put view.html in");
+    if (output.glb && output.out.empty()) throw InputError("--glb needs --out DIR to put anim.glb in");
     requireThreads(output.threads);
 }
 
@@ -152,6 +169,7 @@ int runScene(const Scene& scene, const RunOutput& output, const AfterFrame& afte
     if (!isSilent) printSummary(std::cout, summary);
     if (!isSilent && output.profile) printProfile(std::cout, summary["profile"]);
     if (!isSilent && !output.out.empty()) std::cout << "  written to        " << output.out << '\n';
+    if (!isSilent && output.glb) std::cout << "  anim.glb          " << files.animationSummary() << '\n';
     return result.exitCode();
 }
 

@@ -16,10 +16,10 @@ struct RunOutput {
     int pictureEvery = 0;          ///< frames; 0: no pictures
     std::string size = "960x720";  ///< of the pictures [pixels]
     int threads = 1;
-    bool html = false, profile = false, quiet = false;
+    bool html = false, glb = false, profile = false, quiet = false;
 };
 
-/// Options --png, --size, --html, --profile, --threads and --quiet of a command.
+/// Options --png, --size, --html, --glb, --profile, --threads and --quiet of a command.
 void addOutputOptions(CLI::App& command, RunOutput& output);
 /// Those that need each other, before anything is built; throws InputError.
 void checkOutputOptions(const CLI::App& command, const RunOutput& output);
