@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 struct BenchOptions {
     bench::Options what;
     std::string json, growth, seconds;
-    int substeps = 1, threads = 1;
+    int substeps = 1;
     bool markdown = false, quiet = false;
 };
 
@@ -38,7 +38,7 @@ bench::Options read(const BenchOptions& options, const CLI::App& command) {
         if (options.substeps < 1) throw InputError("--substeps must be >= 1, got " + std::to_string(options.substeps));
         what.substeps = options.substeps;
     }
-    requireThreads(options.threads);
+    requireThreads(what.threads);
     if (!options.seconds.empty()) what.seconds = readDuration("--seconds", options.seconds);
     if (!options.json.empty()) requireFolderOf("--json", options.json);
     if (options.growth.empty()) return what;
@@ -76,7 +76,8 @@ void addBenchCommand(CLI::App& app, int& exitCode) {
     command->add_option("--repeat", options->what.repeat, "Runs of each solver, in turn; 3 if not given");
     command->add_option("--substeps", options->substeps, "Steps a frame, of both; the scene's if not given");
     command->add_option("--seconds", options->seconds, "Simulated time [s]; the scene's if not given");
-    command->add_option("--threads", options->threads, "Threads that solve; 1 is all there is");
+    command->add_option("--threads", options->what.threads,
+                        "Threads that share Jacket's solve; above 1 wall time is measured. 1 if not given");
     command->add_option("--json", options->json, "FILE for the figures");
     command->add_option("--growth", options->growth,
                         "FILE.svg: Jacket alone, from 11 to 1001 vertices a side; plots time, iterations and memory");

@@ -77,16 +77,11 @@ double Result::momentumError() const {
 Json Result::json(const World& end) const {
     const Scene& scene = end.scene();
     const double steps = std::max<double>(1.0, static_cast<double>(m_msPerStep.size()) * m_substeps);
-    Json result{{"version", JACKET_VERSION},
-                {"scene", scene.name},
-                {"seed", scene.seed},
-                {"precision", World::precision()},
-                {"threads", 1},
-                {"dt", scene.dt},
-                {"substeps", scene.substeps},
-                {"frames", m_msPerStep.size()},
-                {"simulated_s", end.time()},
-                {"wall_s", m_wall}};
+    Json result{{"version", JACKET_VERSION},  {"scene", scene.name},
+                {"seed", scene.seed},         {"precision", World::precision()},
+                {"threads", end.threads()},   {"dt", scene.dt},
+                {"substeps", scene.substeps}, {"frames", m_msPerStep.size()},
+                {"simulated_s", end.time()},  {"wall_s", m_wall}};
     result["ms_per_step"] = {{"median", quantile(m_msPerStep, 0.5)}, {"p95", quantile(m_msPerStep, 0.95)}};
     result["pcg_iterations"] = {{"mean", m_iterations / steps}, {"max", m_mostIterations}};
     result["max_stretch"] = numberOrNull(m_end.maxStretch);

@@ -116,11 +116,9 @@ double readDuration(const std::string& option, const std::string& text) {
 }
 
 void requireThreads(int threads) {
-    if (threads < 1) throw InputError("--threads must be >= 1, got " + std::to_string(threads));
-    if (threads > 1)
-        throw InputError("--threads " + std::to_string(threads) +
-                         ": this version of Jacket solves with one thread; give 1, or run several scenes at a time "
-                         "(jacket sweep)");
+    constexpr int kMost = 64;
+    if (threads < 1 || threads > kMost)
+        throw InputError("--threads must be 1.." + std::to_string(kMost) + ", got " + std::to_string(threads));
 }
 
 void addOutputOptions(CLI::App& command, RunOutput& output) {
@@ -129,7 +127,7 @@ void addOutputOptions(CLI::App& command, RunOutput& output) {
     command.add_flag("--html", output.html, "DIR/view.html: the motion in a browser, to be turned by mouse");
     command.add_flag("--glb", output.glb, "DIR/anim.glb: the motion as glTF, for Blender and the like");
     command.add_flag("--profile", output.profile, "Where the time went: a table, and \"profile\" in result.json");
-    command.add_option("--threads", output.threads, "Threads that solve; 1 is all there is");
+    command.add_option("--threads", output.threads, "Threads that share the solve of a large shell; 1 if not given");
     command.add_flag("--quiet", output.quiet, "No progress; with --out nothing at all");
 }
 
@@ -149,7 +147,7 @@ void checkOutputOptions(const CLI::App& command, const RunOutput& output) {
 int runScene(const Scene& scene, const RunOutput& output, const AfterFrame& afterFrame) {
     if (output.profile && scene.isStatic)
         throw InputError("--profile: a scene of mode \"static\" takes no steps whose time could be split up");
-    World world(scene);
+    World world(scene, output.threads);
     Result result(world);
     Files files(output, world);
     std::signal(SIGINT, [](int) { interrupted = 1; });

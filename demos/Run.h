@@ -29,7 +29,7 @@ void checkOutputOptions(const CLI::App& command, const RunOutput& output);
 int runScene(const Scene& scene, const RunOutput& output,
              const std::function<void(int frame, const World&)>& afterFrame = {});
 
-/// Throws InputError when there are not so many threads to be had.
+/// Throws InputError when that is no number of threads to solve with.
 void requireThreads(int threads);
 
 /// A duration that the user gave: a number or a fraction, > 0 [s]. Throws InputError naming the option.

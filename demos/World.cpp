@@ -176,7 +176,9 @@ struct World::Impl {
     double time = 0.0;
 };
 
-World::World(const Scene& scene) : m_impl(std::make_unique<Impl>(scene)) {}
+World::World(const Scene& scene, int threads) : m_impl(std::make_unique<Impl>(scene)) {
+    m_impl->shells.setThreads(threads);
+}
 World::~World() = default;
 
 FrameReport World::step() {
@@ -193,6 +195,9 @@ double World::time() const {
 }
 const Scene& World::scene() const {
     return m_impl->scene;
+}
+int World::threads() const {
+    return m_impl->shells.threads();
 }
 int World::shellCount() const {
     return m_impl->shells.size();

@@ -45,14 +45,15 @@ struct FrameReport {
 
 class World {
   public:
-    /// Reads the meshes and builds everything; throws InputError.
-    explicit World(const Scene& scene);
+    /// Reads the meshes and builds everything; throws InputError. `threads`: as for ShellWorld::setThreads.
+    explicit World(const Scene& scene, int threads = 1);
     ~World();
 
     FrameReport step();  ///< one frame of scene.dt
     double time() const;
 
     const Scene& scene() const;
+    int threads() const;
     int shellCount() const;
     const Shell& shell(int index) const;
     int contactCount(int shell) const;  ///< that carried an impulse in the last step

@@ -22,6 +22,8 @@ constexpr double kMostGainOfFast = 0.1;    ///< the same where a body goes farth
 constexpr double kMostOvertaking = 3.0;    ///< of a shell that is pushed: its speed over the pushing body's
 constexpr double kMostEnergyGain = 1.0;    ///< of a step that is accepted as it is
 
+constexpr int kLeastForTeam = 1000;  ///< vertices of an island from which on threads pay
+
 /// Gives the time since the last call, by the caller's clock if there is one.
 class LapTimer {
   public:
@@ -451,20 +453,21 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
 
 void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
     LapTimer lap(input);
+    WorkerTeam* const team = start.cols() < kLeastForTeam ? nullptr : input.team;
     std::vector<CoupledSystem::ShellPart> parts;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const int n = input.shells[k]->vertexCount();
         const Eigen::Ref<const Points> ahead = (atEnd ? v : start).middleCols(offsets[k], n);
         const StepSystem& step = input.shells[k]->m_assembly->assemble(
             *input.shells[k], stepOf[k], input.gravity, input.wind, from.middleCols(offsets[k], n),
-            y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr);
+            y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr, team);
         parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions()});
     }
     // Bodies that rest on the solution feel what single precision leaves over: soft rows and stacks lose their balance.
     const bool isSingle = dynamicBodies.empty() && linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance &&
                           input.shells[0]->settings().preconditioner == Preconditioner::IncompleteCholesky;
     system.begin(std::move(parts), static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(),
-                 supports.couplings(), isSingle ? Precision::Single : Precision::Double);
+                 supports.couplings(), isSingle ? Precision::Single : Precision::Double, isSingle ? team : nullptr);
     readFreeTwists();
     lap.addTo(times.assembly);
 }

@@ -3,9 +3,9 @@
 
 /// Kernels: free functions over raw pointers that are worth several versions, for the machine at hand to choose from
 /// when the program starts. (By what a machine can do: names like "arch=haswell" would choose by its name alone.) The
-/// address sanitizer does not know functions that are chosen before it is set up.
+/// address and thread sanitizers do not know functions that are chosen before they are set up.
 #if defined(__GNUC__) && __GNUC__ >= 12 && !defined(__clang__) && defined(__x86_64__) && defined(__linux__) && \
-    !defined(__SANITIZE_ADDRESS__)
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define JACKET_KERNEL __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
 #else
 #define JACKET_KERNEL

@@ -92,6 +92,7 @@ PlasticFlow ShellAssembly::flow(const Points& x) {
 
 const StepSystem& ShellAssembly::assembleStatic(const Shell& shell, const Vec3& gravity, double load,
                                                 HessianKind kind) {
+    m_system.setTeam(nullptr);
     m_system.begin(1.0, 0.0, constant());  // a step of 1 s without mass: A = K, b = f
     addEnergies(shell.positions(), kind);
     addLoads(shell, gravity, load);
@@ -119,7 +120,8 @@ void ShellAssembly::addPressureStiffness(const Shell& shell, double pressure) {
 
 const StepSystem& ShellAssembly::assemble(const Shell& shell, double h, const Vec3& gravity, const Wind* wind,
                                           const Eigen::Ref<const Points>& start, const Eigen::Ref<const Points>& y,
-                                          const Eigen::Ref<const Points>* ahead) {
+                                          const Eigen::Ref<const Points>* ahead, WorkerTeam* team) {
+    m_system.setTeam(team);
     if (ahead) m_end = shell.positions() + h * *ahead + y;
     m_system.begin(h, shell.material().stiffnessDamping, constant());       // A = (h^2 + h beta) K_constant, b = 0
     addEnergies(ahead ? m_end : shell.positions(), HessianKind::Positive);  // A += (h^2 + h beta) K, b += h f

@@ -24,10 +24,10 @@ class ShellAssembly {
     ShellAssembly(const Shell& shell, const ShellDesign& design);
     /// A and b of the step from the shell's present state; valid until the next call. With `ahead`, an estimate of the
     /// velocities at the end of the step, the energies are linearised at the end that it leads to: one more Newton
-    /// step.
+    /// step. `team` may help.
     const StepSystem& assemble(const Shell& shell, double h, const Vec3& gravity, const Wind* wind,
                                const Eigen::Ref<const Points>& start, const Eigen::Ref<const Points>& y,
-                               const Eigen::Ref<const Points>* ahead = nullptr);
+                               const Eigen::Ref<const Points>* ahead = nullptr, WorkerTeam* team = nullptr);
     /// K and the unbalanced force in `rhs`, at the shell's positions, under `load` times gravity, forces and pressure.
     const StepSystem& assembleStatic(const Shell& shell, const Vec3& gravity, double load, HessianKind kind);
     const Energy& membrane() const { return *m_energies[0]; }

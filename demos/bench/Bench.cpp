@@ -21,7 +21,7 @@ namespace {
 
 /// What a run is measured by.
 struct Trial {
-    std::vector<double> ms;       ///< CPU time of each frame
+    std::vector<double> ms;       ///< time of each frame
     std::vector<double> stretch;  ///< of each edge at the end [-]
     double peakStretch = 0.0, penetration = 0.0, iterations = 0.0, rssMb = 0.0;
     bool converged = true;
@@ -56,14 +56,21 @@ class EdgeGauge {
     std::vector<double> m_rest;
 };
 
+/// CPU time of this thread does not show what others do; wall time shows all, other programs too.
+enum class Clock { Cpu, Wall };
+
+Clock clockFor(int threads) {
+    return threads > 1 ? Clock::Wall : Clock::Cpu;
+}
+
 /// Runs a world to the end. Between frames, untimed, `positions()` and `bodies()` are measured.
 template <class AnyWorld, class PositionsOf>
-Trial follow(AnyWorld& world, const Scene& scene, const EdgeGauge& gauge, const HalfEdgeMesh& mesh,
+Trial follow(AnyWorld& world, const Scene& scene, const EdgeGauge& gauge, const HalfEdgeMesh& mesh, Clock clock,
              const PositionsOf& positionsOf) {
     Trial trial;
     for (int frame = 0; frame < scene.frames(); ++frame) {
         const FrameReport report = world.step();
-        trial.ms.push_back(1e3 * report.cpuSeconds);
+        trial.ms.push_back(1e3 * (clock == Clock::Wall ? report.seconds : report.cpuSeconds));
         trial.iterations += report.pcgIterations;
         trial.converged = trial.converged && report.converged && report.finite;
         const Points& x = positionsOf(world);
@@ -77,26 +84,27 @@ Trial follow(AnyWorld& world, const Scene& scene, const EdgeGauge& gauge, const 
     return trial;
 }
 
-Trial runJacket(const Scene& scene) {
+Trial runJacket(const Scene& scene, int threads) {
     malloc_trim(0);
     const double before = residentMb();
-    World world(scene);
+    World world(scene, threads);
     const Shell& shell = world.shell(0);
     const EdgeGauge gauge(shell.mesh(), shell.restPositions());
-    Trial trial = follow(world, scene, gauge, shell.mesh(), [](World& w) { return w.shell(0).positions(); });
+    Trial trial =
+        follow(world, scene, gauge, shell.mesh(), clockFor(threads), [](World& w) { return w.shell(0).positions(); });
     malloc_trim(0);
     trial.rssMb = residentMb() - before;
     return trial;
 }
 
-Trial runSoftBody(const Scene& scene) {
+Trial runSoftBody(const Scene& scene, Clock clock) {
     malloc_trim(0);
     const double before = residentMb();
     const TriangleMesh rest = makeGrid(std::get<GridOptions>(scene.shells[0].mesh));
     const HalfEdgeMesh mesh(rest.triangles, static_cast<int>(rest.positions.cols()));
     const EdgeGauge gauge(mesh, rest.positions);
     SoftWorld world(scene);
-    Trial trial = follow(world, scene, gauge, mesh, [](SoftWorld& w) { return w.positions(); });
+    Trial trial = follow(world, scene, gauge, mesh, clock, [](SoftWorld& w) { return w.positions(); });
     trial.iterations = SoftWorld::kIterations;
     malloc_trim(0);
     trial.rssMb = residentMb() - before;
@@ -145,8 +153,8 @@ void warmUp(const Options& options) {
     const Scene scene = sceneOf(options, options.sizes.front());
     brief.seconds = std::min(scene.seconds, 10 * scene.dt);
     const Scene start = sceneOf(brief, options.sizes.front());
-    runJacket(start);
-    if (options.withSoftBody) runSoftBody(start);
+    runJacket(start, options.threads);
+    if (options.withSoftBody) runSoftBody(start, clockFor(options.threads));
 }
 
 }  // namespace
@@ -159,6 +167,7 @@ Bench run(const Options& options, const std::function<void(int, int)>& progress)
     Bench bench{.machine = machine.cpu + ", " + std::to_string(machine.cores) + " processors, " + machine.compiler +
                            ", " + machine.flags + ", Bullet " + machine.bullet + " in " + machine.precision,
                 .scene = first.name,
+                .clock = clockFor(options.threads) == Clock::Wall ? "wall" : "CPU",
                 .dt = first.dt,
                 .substeps = first.substeps,
                 .frames = first.frames(),
@@ -171,13 +180,14 @@ Bench run(const Options& options, const std::function<void(int, int)>& progress)
         const Scene scene = sceneOf(options, n);
         std::vector<Trial> ours, theirs;
         for (int i = 0; i < options.repeat; ++i) {
-            ours.push_back(runJacket(scene));
+            ours.push_back(runJacket(scene, options.threads));
             progress(++done, all);
             if (!options.withSoftBody) continue;
-            theirs.push_back(runSoftBody(scene));
+            theirs.push_back(runSoftBody(scene, clockFor(options.threads)));
             progress(++done, all);
         }
         bench.rows.push_back(summed(n, "jacket", ours));
+        bench.rows.back().threads = options.threads;
         if (options.withSoftBody) bench.rows.push_back(summed(n, "btSoftBody", theirs));
     }
     return bench;

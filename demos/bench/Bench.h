@@ -13,6 +13,7 @@ struct Options {
     std::string scene = "drape";              ///< with one shell, of a grid
     std::vector<int> sizes{11, 31, 71, 101};  ///< vertices along the grid's first axis
     int repeat = 3;                           ///< runs of each solver
+    int threads = 1;                          ///< of Jacket; above 1 frames are measured by wall time
     std::optional<int> substeps;              ///< the scene's if not given
     std::optional<double> seconds;            ///< simulated; the scene's if not given
     bool withSoftBody = true;
@@ -22,7 +23,7 @@ struct Row {
     int n = 0;  ///< vertices along the first axis
     std::string solver;
     int threads = 1, vertices = 0;
-    double msMedian = 0.0, msP95 = 0.0;  ///< CPU time of a frame, over all frames of all runs
+    double msMedian = 0.0, msP95 = 0.0;  ///< time of a frame (Bench::clock), over all frames of all runs
     double spread = 0.0;                 ///< largest less smallest median of a run, over msMedian [-]
     double maxStretch = 0.0, p99Stretch = 0.0, peakStretch = 0.0;  ///< of edges: at the end twice, over the run [-]
     double maxPenetration = 0.0;                                   ///< over the run [m]
@@ -33,7 +34,8 @@ struct Row {
 
 struct Bench {
     std::string machine, scene;
-    double dt = 0.0;  ///< length of a frame [s]
+    std::string clock = "CPU";  ///< or "wall": whose time the frames' is
+    double dt = 0.0;            ///< length of a frame [s]
     int substeps = 1, frames = 0, repeat = 0;
     std::vector<Row> rows;  ///< by size; of each size Jacket's first
 };

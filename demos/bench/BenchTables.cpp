@@ -45,13 +45,21 @@ std::string cell(const Row* row) {
                   100 * row->peakStretch);
 }
 
+/// A line of its own where Jacket has several.
+std::string threadsOf(const Bench& bench) {
+    const int threads = bench.rows.empty() ? 1 : bench.rows.front().threads;
+    if (threads == 1) return "";
+    return format("Jacket with %d threads, btSoftBody with one; times are wall times, other programs' share included\n",
+                  threads);
+}
+
 std::string heading(const Bench& bench) {
     const bool isAlone = bench.rows.empty() || !find(bench, bench.rows.front().n, "btSoftBody");
     return format("%s: %d frames of %.4g s, %d step%s a frame; %s, %d time%s\n", bench.scene.c_str(), bench.frames,
                   bench.dt, bench.substeps, bench.substeps == 1 ? "" : "s",
                   isAlone ? "Jacket alone" : "Jacket and btSoftBody in turn", bench.repeat,
                   bench.repeat == 1 ? "" : "s each") +
-           bench.machine + "\n";
+           bench.machine + "\n" + threadsOf(bench);
 }
 
 std::string measuredTable(const Bench& bench) {
@@ -119,7 +127,7 @@ Json toJson(const Bench& bench) {
 }
 
 std::string table(const Bench& bench) {
-    return heading(bench) + "CPU time of stepping alone; strain of edges at the end and at its peak\n\n" +
+    return heading(bench) + bench.clock + " time of stepping alone; strain of edges at the end and at its peak\n\n" +
            measuredTable(bench) + (bench.scene == "drape" ? peerTable(bench) : "");
 }
 
@@ -143,7 +151,8 @@ std::string markdown(const Bench& bench) {
             text += " - | - | - | - | - |";
         text += "\n";
     }
-    text += "\nCPU ms a frame [strain of edges in %: largest at the end / 99th percentile at the end / peak].";
+    text += "\n" + bench.clock +
+            " ms a frame [strain of edges in %: largest at the end / 99th percentile at the end / peak].";
     if (hasPeers) text += " * Not measured in this run.";
     return text + "\n";
 }

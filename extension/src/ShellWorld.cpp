@@ -111,7 +111,8 @@ struct ShellWorld::Impl {
     ShellChecks checks;
     Wind wind;
     bool hasWind = false, windChanged = false;
-    btVector3 gravity{0, 0, 0};  ///< of the last solve
+    btVector3 gravity{0, 0, 0};        ///< of the last solve
+    std::unique_ptr<WorkerTeam> team;  ///< none: one thread
 };
 
 ShellWorld::ShellWorld(btDynamicsWorld& world) : m_world(world), m_impl(std::make_unique<Impl>()) {
@@ -163,6 +164,17 @@ void ShellWorld::setWind(const Wind& wind) {
 void ShellWorld::clearWind() {
     m_impl->windChanged = m_impl->windChanged || m_impl->hasWind;
     m_impl->hasWind = false;
+}
+
+void ShellWorld::setThreads(int threads) {
+    if (threads < 1)
+        throw std::invalid_argument("ShellWorld::setThreads: threads must be >= 1, got " + std::to_string(threads));
+    if (threads == this->threads()) return;
+    m_impl->team = threads == 1 ? nullptr : std::make_unique<WorkerTeam>(threads);
+}
+
+int ShellWorld::threads() const {
+    return m_impl->team ? m_impl->team->threads() : 1;
 }
 
 std::vector<std::string> ShellWorld::takeWarnings() {
@@ -280,6 +292,7 @@ void ShellWorld::solveIsland(Island& island, double h) {
     input.anchors = island.anchors;
     input.contacts = island.pairs.empty() ? nullptr : &timed;
     input.clock = &seconds;
+    input.team = m_impl->team.get();
     const double start = seconds();
     const StepReport report = m_impl->solvers[island.shells.front()].solve(input);
     m_report.secondsSolve += seconds() - start;

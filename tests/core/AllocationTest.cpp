@@ -6,7 +6,7 @@
 
 #include "EdgeStretch.h"
 #include "ShellAssembly.h"
-#include "jacket/Shell.h"
+#include "jacket/Island.h"
 
 namespace {
 std::atomic<long> allocations{0};
@@ -91,6 +91,28 @@ TEST_P(AllocationOf, AssemblyEnergyAndFlowAreFreeOfItAfterTheFirstStep) {
     const long before = allocations;
     EXPECT_TRUE(std::isfinite(once()));
     EXPECT_EQ(allocations - before, 0);
+}
+
+/// Memory that a team would ask for in a step after the first.
+TEST(Allocation, OfAStepIsTheSameWithATeam) {
+    WorkerTeam team(3);
+    const auto ofTheThirdStep = [&](WorkerTeam* helpers) {
+        Shell shell(makeGrid({.size = {1, 1}, .cells = {60, 60}}), {.young = 1e6, .thickness = 1e-3, .density = 200.0});
+        for (int i = 0; i < 61; ++i) shell.pin(i);
+        Shell* const shells[] = {&shell};
+        IslandSolver solver;
+        long before = 0;
+        for (int step = 0; step < 3; ++step) {
+            IslandInput input;
+            input.shells = shells;
+            input.team = helpers;
+            before = allocations;
+            EXPECT_TRUE(solver.solve(input).finite);
+            shell.advance(input.h);
+        }
+        return allocations - before;
+    };
+    EXPECT_EQ(ofTheThirdStep(&team), ofTheThirdStep(nullptr));
 }
 
 TEST(Allocation, IsCounted) {

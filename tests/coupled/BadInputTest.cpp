@@ -85,6 +85,16 @@ TEST(BadInput, ARepairedBodyTouchesAgain) {
     EXPECT_EQ(scene.shells->takeWarnings().size(), 1u);
 }
 
+TEST(BadInput, NumbersOfThreadsMustBePositive) {
+    Scene scene;
+    EXPECT_THROW(scene.shells->setThreads(0), std::invalid_argument);
+    EXPECT_EQ(scene.shells->threads(), 1);
+    scene.shells->setThreads(2);
+    EXPECT_EQ(scene.shells->threads(), 2);
+    scene.shells->setThreads(1);
+    EXPECT_EQ(scene.shells->threads(), 1);
+}
+
 TEST(BadInput, MassesOfMaterialsMustBePositiveAndFinite) {
     Scene scene;
     for (const double density : {-1.0, 0.0, std::nan(""), std::numeric_limits<double>::infinity()}) {

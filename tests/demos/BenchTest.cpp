@@ -71,7 +71,7 @@ TEST(Bench, RefusesWhatCannotBeCompared) {
         {{"--sizes", "many"}, "--sizes"},
         {{"--repeat", "0"}, "--repeat must be >= 1"},
         {{"--substeps", "0"}, "--substeps must be >= 1"},
-        {{"--threads", "2"}, "solves with one thread"},
+        {{"--threads", "0"}, "--threads must be 1..64, got 0"},
         {{"--json", folder / "none/bench.json"}, "there is no directory"},
     };
     for (auto [arguments, expected] : cases) {

@@ -58,6 +58,19 @@ TEST(Program, RunsTheSceneThatItWroteToTheSameEnd) {
     EXPECT_EQ(TemporaryFolder::read(folder / "a/mesh_0.pc2"), TemporaryFolder::read(folder / "b/mesh_0.pc2"));
 }
 
+TEST(Program, EndsInTheSameStateWithAnyNumberOfThreads) {
+    const TemporaryFolder folder;
+    const auto stateWith = [&](const std::string& threads) {
+        const Outcome run = jacket({"run", "drape", "--set", "shells.0.mesh.grid.cells=[50,50]", "--seconds", "0.1",
+                                    "--threads", threads, "--out", folder / threads, "--quiet"});
+        EXPECT_EQ(run.exitCode, 0) << run.err;
+        const Json result = parseJson(TemporaryFolder::read(folder / (threads + "/result.json")), "result.json");
+        EXPECT_EQ(result["threads"], std::stoi(threads));
+        return result["state"];
+    };
+    EXPECT_EQ(stateWith("1"), stateWith("3"));
+}
+
 TEST(Program, SettlesAStaticScene) {
     const TemporaryFolder folder;
     const Outcome run = jacket({"run", "cantilever", "--out", folder / "out", "--quiet"});
@@ -96,8 +109,8 @@ TEST(Program, BadInputIsExitCode2WithOneMessageAndNothingWritten) {
         {{"run", scene, "--set", "shells.0.pin=[{\"box\":[[5,5,5],[6,6,6]]}]"}, "selects no vertex"},
         {{"run", scene, "--set", "shells.0.material.thickness=-1"}, "must be > 0, got -1"},
         {{"run", scene, "--set", "probes.0.box=[[5,5,5],[6,6,6]]"}, "probes.0.box selects no vertex"},
-        {{"run", scene, "--threads", "0"}, "--threads must be >= 1, got 0"},
-        {{"run", scene, "--threads", "3"}, "solves with one thread"},
+        {{"run", scene, "--threads", "0"}, "--threads must be 1..64, got 0"},
+        {{"run", scene, "--threads", "65"}, "--threads must be 1..64, got 65"},
         {{"run", "cantilever", "--profile"}, "takes no steps"},
         {{"run", scene, "--png", "0"}, "--png must be >= 1"},
         {{"run", scene, "--png", "1", "--size", "big"}, "--size must be WIDTHxHEIGHT"},

@@ -3,6 +3,7 @@
 #include <span>
 
 #include "jacket/Shell.h"
+#include "jacket/WorkerTeam.h"
 
 namespace jacket {
 
@@ -18,6 +19,7 @@ struct IslandInput {
     std::span<const Anchor> anchors{};
     ContactDetector* contacts = nullptr;  ///< none: no contacts
     double (*clock)() = nullptr;          ///< [s]; null: no times are taken
+    WorkerTeam* team = nullptr;           ///< shares the work of large islands; the same bits with and without
 };
 
 /// Solves for the velocities of one step: A v = b with contacts as filter, bodies as six unknowns each (see

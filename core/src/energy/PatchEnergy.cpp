@@ -11,6 +11,8 @@
 namespace jacket {
 namespace {
 
+constexpr int kRowsAtATime = 1024;  ///< that a thread of a team takes
+
 TriangleNormal normalOf(const int* v, const Points& x) {
     const Vec3 x0 = x.col(v[0]), x1 = x.col(v[1]), x2 = x.col(v[2]);
     const Vec3 twiceArea = (x1 - x0).cross(x2 - x0);
@@ -43,9 +45,9 @@ JACKET_INLINE void multiplyRow(const ConstantRows& rows, int i, double (&sum)[4]
     }
 }
 
-/// to += factor K x, by three numbers a vertex.
-JACKET_KERNEL void addConstantGradient(const ConstantRows& rows, double factor, double* to) {
-    for (int i = 0; i < rows.count; ++i) {
+/// to += factor K x for rows begin to end - 1, by three numbers a vertex.
+JACKET_KERNEL void addConstantGradient(const ConstantRows& rows, int begin, int end, double factor, double* to) {
+    for (int i = begin; i < end; ++i) {
         double sum[4];
         multiplyRow(rows, i, sum);
         for (int c = 0; c < 3; ++c) to[3 * i + c] += factor * sum[c];
@@ -318,9 +320,9 @@ void PatchEnergy::pad(const Points& x) const {
 
 void PatchEnergy::addGradient(const Points& x, Points& gradient) const {
     pad(x);
-    addConstantGradient({m_constant.outerIndexPtr(), m_constant.innerIndexPtr(), m_constant.valuePtr(), m_padded.data(),
-                         static_cast<int>(x.cols())},
-                        1.0, gradient.data());
+    const ConstantRows rows{m_constant.outerIndexPtr(), m_constant.innerIndexPtr(), m_constant.valuePtr(),
+                            m_padded.data(), static_cast<int>(x.cols())};
+    addConstantGradient(rows, 0, rows.count, 1.0, gradient.data());
     const auto add = [&](int vertex, const Vec3& g) { gradient.col(vertex) += g; };
     for (const Element& e : m_elements) {
         if (e.mirrored >= 0)
@@ -333,9 +335,10 @@ void PatchEnergy::addGradient(const Points& x, Points& gradient) const {
 void PatchEnergy::addTo(StepSystem& system, const Points& x, HessianKind kind) const {
     pad(x);
     const TermSink sink = system.sink();
-    addConstantGradient({m_constant.outerIndexPtr(), m_constant.innerIndexPtr(), m_constant.valuePtr(), m_padded.data(),
-                         static_cast<int>(x.cols())},
-                        sink.gradientFactor, sink.rhs);
+    const ConstantRows rows{m_constant.outerIndexPtr(), m_constant.innerIndexPtr(), m_constant.valuePtr(),
+                            m_padded.data(), static_cast<int>(x.cols())};
+    runRanges(system.team(), static_cast<int>(x.cols()), kRowsAtATime,
+              [&](int begin, int end) { addConstantGradient(rows, begin, end, sink.gradientFactor, sink.rhs); });
     for (const Element& e : m_elements) {
         if (e.mirrored >= 0) addMirrored(e, system, x);
         if (e.isCurved()) addNormalTerms(e, system, x, kind);

@@ -3,6 +3,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "energy/ColouredRanges.h"
 #include "energy/Energy.h"
 #include "energy/TriangleKernel.h"
 
@@ -28,6 +29,7 @@ class StencilEnergy final : public Energy {
     StencilEnergy(std::vector<Group> groups, const RestShape& rest) : m_groups(std::move(groups)) {
         m_rest.resize(m_groups.size());
         m_slots.resize(m_groups.size());
+        m_ranges.resize(m_groups.size());
         m_accumulated.resize(m_groups.size());
         for (std::size_t g = 0; g < m_groups.size(); ++g) {
             const Group& group = m_groups[g];
@@ -49,6 +51,7 @@ class StencilEnergy final : public Energy {
             m_slots[g].clear();
             m_slots[g].reserve(m_groups[g].stencils.size());
             for (const auto& stencil : m_groups[g].stencils) m_slots[g].push_back(stencilSlots<N>(matrix, stencil));
+            if constexpr (TriangleTermModel<Model>) m_ranges[g] = ColouredRanges(m_groups[g].stencils);
         }
     }
 
@@ -57,7 +60,9 @@ class StencilEnergy final : public Energy {
             const Group& group = m_groups[g];
             if constexpr (TriangleTermModel<Model>)
                 if (kind == HessianKind::Positive) {
-                    addTriangles<Model>(triangles(g), x.data(), system.sink());
+                    m_ranges[g].run(system.team(), [&, sink = system.sink()](int begin, int end) {
+                        addTriangles<Model>(triangles(g), begin, end, x.data(), sink);
+                    });
                     continue;
                 }
             for (std::size_t i = 0; i < group.stencils.size(); ++i) {
@@ -173,6 +178,7 @@ class StencilEnergy final : public Energy {
     std::vector<Group> m_groups;
     std::vector<std::vector<typename Model::Rest>> m_rest;
     std::vector<std::vector<Slots>> m_slots;
+    std::vector<ColouredRanges> m_ranges;            ///< of models whose terms are computed several at a time
     std::vector<std::vector<Mat2>> m_stress;         ///< predicted; empty outside Newton's method for statics
     std::vector<std::vector<double>> m_accumulated;  ///< plastic strain; empty until something is asked to flow
 };

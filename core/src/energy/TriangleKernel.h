@@ -6,8 +6,8 @@
 #include "jacket/models/TriangleTerm.h"
 #include "solver/StepSystem.h"
 
-/// The loops over triangles whose terms are computed several at a time. The order of all sums is that of the triangles,
-/// and a triangle's term does not depend on where in the list it stands: same bits in every run.
+/// The loops over triangles whose terms are computed several at a time. The order of all sums is fixed, and a
+/// triangle's term does not depend on where in the list it stands: same bits in every run.
 namespace jacket {
 
 inline constexpr int kLanes = 8;  ///< triangles at a time
@@ -82,11 +82,13 @@ JACKET_INLINE void addSymmetric(double* block, const double (*from)[kLanes], int
     block[6] += xz, block[7] += yz, block[8] += from[5][l];
 }
 
-/// Adds the positive part of every triangle's term at positions `x`.
+/// Adds the positive part of the term of triangles begin to end - 1 at positions `x`. `begin` is a multiple of kLanes,
+/// as is `end` unless it is the last one's.
 template <class Model>
-JACKET_KERNEL void addTriangles(const TriangleList<typename Model::Rest>& list, const double* x, const TermSink& sink) {
+JACKET_KERNEL void addTriangles(const TriangleList<typename Model::Rest>& list, int begin, int end, const double* x,
+                                const TermSink& sink) {
     typename Model::Rest padded[kLanes];
-    for (int first = 0; first < list.count; first += kLanes) {
+    for (int first = begin; first < end; first += kLanes) {
         const auto* rest = restOf(list, first, padded);
         Lanes<9> corners, gradient, block10, block20, block21;
         Lanes<6> block00, block11, block22;

@@ -10,7 +10,9 @@
 namespace jacket {
 namespace {
 
-constexpr int kPatchSize = 64;  ///< vertices
+constexpr int kPatchSize = 64;                             ///< vertices
+constexpr int kAhead = 4;                                  ///< rows between prefetch and use
+constexpr int kPatchesAtATime = 16, kBlocksAtATime = 128;  ///< that a thread of a team takes
 
 using Double4 = double __attribute__((vector_size(32)));
 
@@ -257,17 +259,31 @@ JACKET_INLINE void addModes(Float4 r, const Float4* t, double* sums) {
 }
 
 struct Galerkin {
-    int size;
-    const int *rowStart, *column, *target, *patchOf;
+    const int *patchStart, *members, *rowStart, *column, *target, *patchOf;
     const int *besideStart, *besideColumn, *besideTarget;
     const float *blocks, *rowSums, *beside, *arms;
     const char *isHeld, *isNearHeld;  ///< see CoarseSpace
     double *sums, *besideSums;
-    float *moments, *crossSums;
+    float* moments;
 };
 
-JACKET_KERNEL void addBlocks(const Galerkin& g) {
-    for (int i = 0; i < g.size; ++i) {
+/// What the next rows of a patch need, which are far apart in memory.
+JACKET_INLINE void prefetch(const void* from, const void* to) {
+    constexpr std::ptrdiff_t kLine = 64;
+    for (const char* at = static_cast<const char*>(from); at < to; at += kLine) __builtin_prefetch(at);
+}
+
+/// Of a patch's rows. Only its own blocks of P^T A P are written to, here and below.
+JACKET_KERNEL void addBlocks(const Galerkin& g, int patch) {
+    for (int m = g.patchStart[patch]; m < g.patchStart[patch + 1]; ++m) {
+        const int i = g.members[m];
+        if (m + kAhead < g.patchStart[patch + 1]) {
+            const int next = g.members[m + kAhead];
+            prefetch(g.rowSums + 9 * next, g.rowSums + 9 * next + 9);
+            prefetch(g.blocks + 9 * g.rowStart[next], g.blocks + 9 * g.rowStart[next + 1]);
+            prefetch(g.column + g.rowStart[next], g.column + g.rowStart[next + 1]);
+            prefetch(g.target + g.rowStart[next], g.target + g.rowStart[next + 1]);
+        }
         if (g.isNearHeld[i]) continue;  // see addHeldRow
         const Float4 ri = load4(g.arms + 4 * i);
         const float* rowSum = g.rowSums + 9 * i;
@@ -295,44 +311,49 @@ JACKET_KERNEL void addBlocks(const Galerkin& g) {
 }
 
 /// moments += s (r_i, 1) (r_j, 1)^T
-JACKET_INLINE void addMoment(float s, Float4 ri, Float4 rj, float* moments) {
-    for (int c = 0; c < 4; ++c) store4(moments + 4 * c, load4(moments + 4 * c) + s * ri[c] * rj);
+JACKET_INLINE void addMoment(float s, Float4 ri, Float4 rj, Float4 (&moments)[4]) {
+    for (int c = 0; c < 4; ++c) moments[c] += s * ri[c] * rj;
 }
 
-/// Of pairs in different patches: what belongs to the two patches themselves.
-JACKET_INLINE void addCross(const Galerkin& g, float s, int i, int j, int target) {
-    g.besideSums[target] += s;
-    g.besideSums[g.patchOf[i]] -= s;
-    g.besideSums[g.patchOf[j]] -= s;
-    g.crossSums[i] -= s;
-    g.crossSums[j] -= s;
+JACKET_INLINE void addMomentAt(float s, Float4 ri, Float4 rj, float* moments) {
+    for (int c = 0; c < 4; ++c) store4(moments + 4 * c, load4(moments + 4 * c) + s * ri[c] * rj);
 }
 
 /// Pairs with a held vertex are left out: near it the shell seems stiffer than it is, which harms less than taking the
 /// trouble.
-JACKET_KERNEL void addScalars(const Galerkin& g) {
-    for (int i = 0; i < g.size; ++i) {
+JACKET_KERNEL void addScalars(const Galerkin& g, int patch) {
+    Float4 own[4] = {};
+    double ownSum = 0.0;
+    for (int m = g.patchStart[patch]; m < g.patchStart[patch + 1]; ++m) {
+        const int i = g.members[m];
+        if (m + kAhead < g.patchStart[patch + 1]) {
+            const int next = g.members[m + kAhead];
+            prefetch(g.beside + g.besideStart[next], g.beside + g.besideStart[next + 1]);
+            prefetch(g.besideColumn + g.besideStart[next], g.besideColumn + g.besideStart[next + 1]);
+            prefetch(g.besideTarget + g.besideStart[next], g.besideTarget + g.besideStart[next + 1]);
+        }
         if (g.isHeld[i]) continue;
         const Float4 ri = load4(g.arms + 4 * i);
+        float crossSum = 0.0f;  // of scalars to other patches
         for (int k = g.besideStart[i]; k < g.besideStart[i + 1]; ++k) {
             const int j = g.besideColumn[k], target = g.besideTarget[k];
             if (g.isHeld[j]) continue;
+            const float s = g.beside[k];
             const Float4 rj = load4(g.arms + 4 * j);
-            if (target == g.patchOf[i]) {
-                addMoment(-g.beside[k], rj - ri, rj - ri, g.moments + kMoments * target);
-            } else if (target >= 0) {
-                addMoment(g.beside[k], ri, rj, g.moments + kMoments * target);
-                addCross(g, g.beside[k], i, j, target);
-            } else {
-                addMoment(g.beside[k], rj, ri, g.moments + kMoments * ~target);
-                addCross(g, g.beside[k], i, j, ~target);
+            if (target == patch) {
+                if (j < i) addMoment(-s, rj - ri, rj - ri, own);
+                continue;
             }
+            crossSum -= s;
+            ownSum -= s;
+            if (target < 0) continue;
+            addMomentAt(s, ri, rj, g.moments + kMoments * target);
+            g.besideSums[target] += s;
         }
+        addMoment(crossSum, ri, ri, own);
     }
-    for (int i = 0; i < g.size; ++i) {
-        const Float4 ri = load4(g.arms + 4 * i);
-        addMoment(g.crossSums[i], ri, ri, g.moments + kMoments * g.patchOf[i]);
-    }
+    for (int c = 0; c < 4; ++c) store4(g.moments + kMoments * patch + 4 * c, own[c]);
+    g.besideSums[patch] = ownSum;
 }
 
 /// P^T A P's part of a row that is held, or next to one that is.
@@ -421,10 +442,8 @@ void CoarseSpace::findTargets(const CompactMatrix& matrix) {
         const int p = m_patchOf[row];
         for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k)
             m_target.push_back(m_factor.index(p, m_patchOf[matrix.column(k)]));
-        for (int k = matrix.besideBegin(row); k < matrix.besideEnd(row); ++k) {
-            const int q = m_patchOf[matrix.besideColumn(k)];
-            m_besideTarget.push_back(p >= q ? m_factor.index(p, q) : ~m_factor.index(q, p));
-        }
+        for (int k = matrix.besideBegin(row); k < matrix.besideEnd(row); ++k)
+            m_besideTarget.push_back(m_factor.index(p, m_patchOf[matrix.besideColumn(k)]));
     }
 }
 
@@ -450,8 +469,8 @@ void CoarseSpace::placeArms(const CompactMatrix& matrix, const Points& positions
 }
 
 /// The matrices are added up by the kernels in forms of their own; here they become the factor's blocks.
-void CoarseSpace::collect(double besideFactor) {
-    for (int b = 0; b < m_factor.blockCount(); ++b) {
+void CoarseSpace::collect(double besideFactor, int begin, int end) {
+    for (int b = begin; b < end; ++b) {
         Eigen::Map<Mat6> block(m_factor.block(b));
         const double* sums = m_sums.data() + kSums * b;
         for (int column = 0; column < 6; ++column)
@@ -488,7 +507,7 @@ void CoarseSpace::addTies(const std::vector<const Mat3*>& free, std::span<const 
 }
 
 void CoarseSpace::build(const CompactMatrix& matrix, const Points& positions, const std::vector<const Mat3*>& free,
-                        std::span<const Tie> ties) {
+                        std::span<const Tie> ties, WorkerTeam* team) {
     placeArms(matrix, positions);
     m_isHeld.assign(matrix.size(), 0);
     m_isNearHeld.assign(matrix.size(), 0);
@@ -500,18 +519,20 @@ void CoarseSpace::build(const CompactMatrix& matrix, const Points& positions, co
     m_sums.assign(kSums * m_factor.blockCount(), 0.0);
     m_moments.assign(kMoments * m_factor.blockCount(), 0.0f);
     m_besideSums.assign(m_factor.blockCount(), 0.0);
-    m_crossSums.assign(matrix.size(), 0.0f);
     const auto view = matrix.view();
-    const Galerkin g{matrix.size(),    view.rowStart,       view.column,       m_target.data(),
-                     m_patchOf.data(), view.besideStart,    view.besideColumn, m_besideTarget.data(),
-                     view.blocks,      view.rowSums,        view.beside,       m_arms.data(),
-                     m_isHeld.data(),  m_isNearHeld.data(), m_sums.data(),     m_besideSums.data(),
-                     m_moments.data(), m_crossSums.data()};
-    addBlocks(g);
-    for (int row = 0; row < matrix.size(); ++row)
-        if (m_isNearHeld[row]) addHeldRow(g, row, free);
-    addScalars(g);
-    collect(matrix.besideFactor());
+    const Galerkin g{m_patchStart.data(),   m_members.data(), view.rowStart,       view.column,
+                     m_target.data(),       m_patchOf.data(), view.besideStart,    view.besideColumn,
+                     m_besideTarget.data(), view.blocks,      view.rowSums,        view.beside,
+                     m_arms.data(),         m_isHeld.data(),  m_isNearHeld.data(), m_sums.data(),
+                     m_besideSums.data(),   m_moments.data()};
+    runParts(team, patchCount(), [&](int patch) {
+        addBlocks(g, patch);
+        for (int m = m_patchStart[patch]; m < m_patchStart[patch + 1]; ++m)
+            if (m_isNearHeld[m_members[m]]) addHeldRow(g, m_members[m], free);
+        addScalars(g, patch);
+    });
+    runRanges(team, m_factor.blockCount(), kBlocksAtATime,
+              [&](int begin, int end) { collect(matrix.besideFactor(), begin, end); });
     addTies(free, ties);
     m_factor.factor();
 }
@@ -519,13 +540,12 @@ void CoarseSpace::build(const CompactMatrix& matrix, const Points& positions, co
 namespace {
 
 struct Transfer {
-    int patches;
     const int *start, *members;
     const float* arms;
 };
 
-JACKET_KERNEL void restrictTo(const Transfer& t, const float* r, double* coarse) {
-    for (int p = 0; p < t.patches; ++p) {
+JACKET_KERNEL void restrictTo(const Transfer& t, int begin, int end, const float* r, double* coarse) {
+    for (int p = begin; p < end; ++p) {
         Float4 force{}, torque{};
         for (int k = t.start[p]; k < t.start[p + 1]; ++k) {
             const Float4 f = load4(r + 4 * t.members[k]);
@@ -539,8 +559,8 @@ JACKET_KERNEL void restrictTo(const Transfer& t, const float* r, double* coarse)
     }
 }
 
-JACKET_KERNEL void addProlonged(const Transfer& t, const double* coarse, float* z) {
-    for (int p = 0; p < t.patches; ++p) {
+JACKET_KERNEL void addProlonged(const Transfer& t, int begin, int end, const double* coarse, float* z) {
+    for (int p = begin; p < end; ++p) {
         Float4 linear{}, angular{};
         for (int c = 0; c < 3; ++c) {
             linear[c] = static_cast<float>(coarse[6 * p + c]);
@@ -555,11 +575,22 @@ JACKET_KERNEL void addProlonged(const Transfer& t, const double* coarse, float* 
 
 }  // namespace
 
+void CoarseSpace::restrictFrom(const float* r, WorkerTeam* team) const {
+    const Transfer transfer{m_patchStart.data(), m_members.data(), m_arms.data()};
+    runRanges(team, patchCount(), kPatchesAtATime,
+              [&](int begin, int end) { restrictTo(transfer, begin, end, r, m_coarse.data()); });
+}
+
+void CoarseSpace::prolongTo(float* z, WorkerTeam* team) const {
+    const Transfer transfer{m_patchStart.data(), m_members.data(), m_arms.data()};
+    runRanges(team, patchCount(), kPatchesAtATime,
+              [&](int begin, int end) { addProlonged(transfer, begin, end, m_coarse.data(), z); });
+}
+
 void CoarseSpace::addTo(const float* r, float* z) const {
-    const Transfer transfer{patchCount(), m_patchStart.data(), m_members.data(), m_arms.data()};
-    restrictTo(transfer, r, m_coarse.data());
-    m_factor.solve(m_coarse.data());
-    addProlonged(transfer, m_coarse.data(), z);
+    restrictFrom(r, nullptr);
+    solve();
+    prolongTo(z, nullptr);
 }
 
 }  // namespace jacket

@@ -48,9 +48,13 @@ class CoarseSpace {
     };
     /// `free`: projector of each constrained row, null for all others.
     void build(const CompactMatrix& matrix, const Points& positions, const std::vector<const Mat3*>& free,
-               std::span<const Tie> ties);
+               std::span<const Tie> ties, WorkerTeam* team = nullptr);
     /// z += P (P^T A P)^-1 P^T r, four floats a row.
     void addTo(const float* r, float* z) const;
+    /// The same in steps.
+    void restrictFrom(const float* r, WorkerTeam* team) const;
+    void solve() const { m_factor.solve(m_coarse.data()); }
+    void prolongTo(float* z, WorkerTeam* team) const;
     int patchCount() const { return m_factor.size(); }
     const std::vector<int>& patchOf() const { return m_patchOf; }  ///< of each row
 
@@ -58,19 +62,18 @@ class CoarseSpace {
     void findTargets(const CompactMatrix& matrix);
     void placeArms(const CompactMatrix& matrix, const Points& positions);
     void addTies(const std::vector<const Mat3*>& free, std::span<const Tie> ties);
-    void collect(double besideFactor);
+    void collect(double besideFactor, int begin, int end);
     std::vector<int> m_patchOf;                ///< of each row; patches are numbered as they are eliminated
     std::vector<int> m_patchStart, m_members;  ///< rows of each patch
     CoarseFactor m_factor;
     std::vector<int> m_target;         ///< factor's block of each block of the matrix; -1: its mirror image has it
-    std::vector<int> m_besideTarget;   ///< of each scalar; ~index where it is the mirror image's
+    std::vector<int> m_besideTarget;   ///< the same of each scalar
     std::vector<char> m_isHeld;        ///< rows with a projector
     std::vector<char> m_isNearHeld;    ///< and those beside them
     std::vector<float> m_arms;         ///< of each row from its patch' centre over the patch' size, and 1
     std::vector<double> m_sums;        ///< P^T A P of the blocks: 6 columns of (3, 0, 3, 0) a block
     std::vector<float> m_moments;      ///< of the scalars: sum s (r_i, 1) (r_j, 1)^T a block
     std::vector<double> m_besideSums;  ///< the last entry of each moment, which must add up to 0
-    std::vector<float> m_crossSums;    ///< of each row's scalars to other patches
     mutable std::vector<double> m_coarse;
 };
 

@@ -1,6 +1,7 @@
 #include "solver/CompactFactor.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "Kernel.h"
@@ -12,7 +13,6 @@ using Double4 = double __attribute__((vector_size(32)));
 
 /// What a factor is made of, as plain memory for the kernels. Blocks are nine numbers by columns.
 struct Factoring {
-    int size;
     const int *vertexOf, *rowStart, *column, *source, *pairStart, *pairs, *upperOf;
     const double *diagonal, *values;
     double *inverse, *scaled, *left;
@@ -69,11 +69,11 @@ JACKET_INLINE void storeRoot(const Triangular& t, float* root, float* rootTransp
         }
 }
 
-/// False where a pivot falls far below what it was in the matrix: the factor has broken down.
-JACKET_KERNEL bool factorKernel(const Factoring& factoring) {
+/// Of rows begin to end - 1. False where a pivot falls far below what it was in the matrix: the factor has broken down.
+JACKET_KERNEL bool factorKernel(const Factoring& factoring, int begin, int end) {
     constexpr double kLeast = 1e-3;
     const Factoring f = factoring;  // nobody writes there
-    for (int i = 0; i < f.size; ++i) {
+    for (int i = begin; i < end; ++i) {
         Double4 d[3] = {};
         loadBlock(f.diagonal + 9 * static_cast<std::size_t>(f.vertexOf[i]), d);
         const Triangular before = triangular(d);
@@ -108,21 +108,19 @@ JACKET_KERNEL bool factorKernel(const Factoring& factoring) {
     return true;
 }
 
-struct Solving {
-    int size;
-    const int *rowStart, *column, *upperStart, *upperColumn;
-    const float *root, *rootTransposed, *lower, *upper;
-};
-
-JACKET_KERNEL void applyKernel(const Solving& solving, const float* r, float* z) {
-    const Solving f = solving;  // nobody writes there
-    for (int i = 0; i < f.size; ++i) {
+JACKET_KERNEL void forwardKernel(const CompactFactor::Solving& solving, int begin, int end, const float* r, float* z) {
+    const CompactFactor::Solving f = solving;  // nobody writes there
+    for (int i = begin; i < end; ++i) {
         Float4 sum = load4(r + 4 * i);
         for (int k = f.rowStart[i]; k < f.rowStart[i + 1]; ++k)
             sum -= times(f.lower + 9 * k, load4(z + 4 * f.column[k]));
         store4(z + 4 * i, sum);
     }
-    for (int i = f.size - 1; i >= 0; --i) {
+}
+
+JACKET_KERNEL void backwardKernel(const CompactFactor::Solving& solving, int begin, int end, float* z) {
+    const CompactFactor::Solving f = solving;  // nobody writes there
+    for (int i = end - 1; i >= begin; --i) {
         Float4 sum = times(f.rootTransposed + 9 * i, times(f.root + 9 * i, load4(z + 4 * i)));
         for (int k = f.upperStart[i]; k < f.upperStart[i + 1]; ++k)
             sum -= times(f.upper + 9 * k, load4(z + 4 * f.upperColumn[k]));
@@ -133,8 +131,11 @@ JACKET_KERNEL void applyKernel(const Solving& solving, const float* r, float* z)
 }  // namespace
 
 CompactFactor::CompactFactor(const CompactMatrix& matrix)
-    : m_size(matrix.size()), m_vertexOf(matrix.size()), m_rowStart(1, 0), m_upperStart(1, 0) {
-    for (int i = 0; i < m_size; ++i) m_vertexOf[matrix.rowOf()[i]] = i;
+    : m_size(matrix.size()),
+      m_partStart(matrix.partStarts()),
+      m_vertexOf(matrix.vertexOf()),
+      m_rowStart(1, 0),
+      m_upperStart(1, 0) {
     for (int row = 0; row < m_size; ++row) {
         for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) {
             if (matrix.column(k) < row) {
@@ -166,12 +167,11 @@ CompactFactor::CompactFactor(const CompactMatrix& matrix)
     for (auto* perBlock : {&m_lower, &m_upper}) perBlock->assign(9 * m_column.size() + 3, 0.0f);
 }
 
-void CompactFactor::factor(const std::vector<Mat3>& diagonal, const std::vector<Mat3>& lower) {
+void CompactFactor::factor(const std::vector<Mat3>& diagonal, const std::vector<Mat3>& lower, WorkerTeam* team) {
     constexpr double kMostShift = 1e3;  // as good as block Jacobi; keeps the loop finite on garbage
     m_shift *= 0.9;  // let it shrink again when the breakdown is over; a factor cares little for its size
     if (m_shift < 1e-3) m_shift = 0.0;
-    Factoring f{m_size,
-                m_vertexOf.data(),
+    Factoring f{m_vertexOf.data(),
                 m_rowStart.data(),
                 m_column.data(),
                 m_source.data(),
@@ -188,7 +188,15 @@ void CompactFactor::factor(const std::vector<Mat3>& diagonal, const std::vector<
                 m_lower.data(),
                 m_upper.data(),
                 m_shift};
-    while (!factorKernel(f)) {
+    const int strips = stripCount();
+    const auto factorParts = [&](int first, int count) {
+        std::atomic<bool> works = true;
+        runParts(team, count, [&](int i) {
+            if (!factorKernel(f, m_partStart[first + i], m_partStart[first + i + 1])) works = false;
+        });
+        return works.load();
+    };
+    while (!factorParts(0, strips) || !factorParts(strips, strips - 1)) {
         m_shift = std::max(2.0 * m_shift, 5e-3);
         f.shift = m_shift;
         if (m_shift > kMostShift) return factorDiagonally(diagonal);
@@ -208,9 +216,29 @@ void CompactFactor::factorDiagonally(const std::vector<Mat3>& diagonal) {
 }
 
 void CompactFactor::apply(const float* r, float* z) const {
-    const Solving f{m_size,        m_rowStart.data(),       m_column.data(), m_upperStart.data(), m_upperColumn.data(),
-                    m_root.data(), m_rootTransposed.data(), m_lower.data(),  m_upper.data()};
-    applyKernel(f, r, z);
+    const int strips = stripCount();
+    for (int i = 0; i < strips; ++i) forward(i, r, z);
+    for (int i = 0; i < strips - 1; ++i) solveSeparator(i, r, z);
+    for (int i = 0; i < strips; ++i) backward(i, z);
+}
+
+CompactFactor::Solving CompactFactor::solving() const {
+    return {m_rowStart.data(), m_column.data(),         m_upperStart.data(), m_upperColumn.data(),
+            m_root.data(),     m_rootTransposed.data(), m_lower.data(),      m_upper.data()};
+}
+
+void CompactFactor::forward(int strip, const float* r, float* z) const {
+    forwardKernel(solving(), m_partStart[strip], m_partStart[strip + 1], r, z);
+}
+
+void CompactFactor::solveSeparator(int separator, const float* r, float* z) const {
+    const int part = stripCount() + separator;
+    forwardKernel(solving(), m_partStart[part], m_partStart[part + 1], r, z);
+    backwardKernel(solving(), m_partStart[part], m_partStart[part + 1], z);
+}
+
+void CompactFactor::backward(int strip, float* z) const {
+    backwardKernel(solving(), m_partStart[strip], m_partStart[strip + 1], z);
 }
 
 }  // namespace jacket

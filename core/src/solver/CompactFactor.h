@@ -11,15 +11,29 @@ class CompactFactor {
     /// Takes the pattern.
     explicit CompactFactor(const CompactMatrix& matrix);
     /// `diagonal` and `lower` are the values, in the order of the block matrix that the pattern came from.
-    void factor(const std::vector<Mat3>& diagonal, const std::vector<Mat3>& lower);
+    void factor(const std::vector<Mat3>& diagonal, const std::vector<Mat3>& lower, WorkerTeam* team = nullptr);
     /// z = (L D L^T)^-1 r, four floats a row; the last of each is 0 in z. r and z may be the same.
     void apply(const float* r, float* z) const;
+    /// The same in parts: forward for every strip, then every separator, then backward for every strip (see
+    /// CompactMatrix::stripCount). What one of these says may be done in any order, or at the same time.
+    int stripCount() const { return static_cast<int>(m_partStart.size()) / 2; }
+    void forward(int strip, const float* r, float* z) const;
+    void solveSeparator(int separator, const float* r, float* z) const;
+    void backward(int strip, float* z) const;
     double shift() const { return m_shift; }
 
+    /// All that solving reads, as plain memory for the kernels. Blocks are nine floats by columns.
+    struct Solving {
+        const int *rowStart, *column, *upperStart, *upperColumn;
+        const float *root, *rootTransposed, *lower, *upper;
+    };
+
   private:
+    Solving solving() const;
     void factorDiagonally(const std::vector<Mat3>& diagonal);
     int m_size;
-    std::vector<int> m_vertexOf;  ///< of each row
+    std::vector<int> m_partStart;  ///< see CompactMatrix::partStarts
+    std::vector<int> m_vertexOf;   ///< of each row
     /// Strictly lower blocks by rows: column, and where they come from (see CompactMatrix::source).
     std::vector<int> m_rowStart, m_column, m_source;
     /// Block k loses L_p D L_q^T for its pairs (p, q).

@@ -1,12 +1,15 @@
 #include "solver/CompactMatrix.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <numeric>
 
 #include "Kernel.h"
 
 namespace jacket {
 namespace {
+
+constexpr int kRowsAtATime = 512;
 
 using Neighbours = std::vector<std::vector<int>>;
 
@@ -63,34 +66,79 @@ std::vector<int> cuthillMcKee(const Neighbours& neighbours) {
     return order;
 }
 
-/// The same order but for steps that do not need one another: vertices by the length of the longest chain of earlier
-/// neighbours. An incomplete factor stays the same; a processor can work on several rows at once.
-std::vector<int> rowsByLevel(const Neighbours& neighbours, const std::vector<int>& order) {
-    std::vector<int> place(order.size()), level(order.size()), rowOf(order.size());
+/// Vertices in the order of elimination, and how many parts of it there are (see CompactMatrix::stripCount).
+struct Division {
+    int strips = 1;
+    std::vector<int> order;
+    std::vector<int> partOf;  ///< each vertex
+};
+
+/// How many strips a shell is cut into: the same for any number of threads. Each costs some iterations.
+int stripCountOf(int size, int bandwidth) {
+    constexpr int kLeastSize = 2500, kRowsAStrip = 5000, kMostStrips = 8;
+    constexpr int kLeastWidth = 4;  // in bandwidths: at two, separators may meet
+    if (size < kLeastSize) return 1;
+    return std::min(std::clamp(size / kRowsAStrip, 2, kMostStrips), std::max(1, size / (kLeastWidth * bandwidth)));
+}
+
+/// Cuts an order into strips of as many vertices. What has a neighbour in the next strip is a separator, and comes
+/// last. A strip is taken from where it is farthest from any of them, which spares more iterations than it costs to be
+/// cut.
+Division divide(const Neighbours& neighbours, const std::vector<int>& order) {
+    const int n = static_cast<int>(order.size());
+    std::vector<int> place(n), rank(n);
+    for (int k = 0; k < n; ++k) place[order[k]] = k;
+    int bandwidth = 1;
+    for (int i = 0; i < n; ++i)
+        for (const int j : neighbours[i]) bandwidth = std::max(bandwidth, place[j] - place[i]);
+    const int strips = stripCountOf(n, bandwidth);
+    Division result{.strips = strips, .order = order, .partOf = std::vector<int>(n)};
+    const auto begin = [&](std::int64_t strip) { return static_cast<int>(strip * n / strips); };
+    for (int strip = 0; strip < strips; ++strip)
+        for (int k = begin(strip); k < begin(strip + 1); ++k) {
+            const auto& near = neighbours[order[k]];
+            const bool isSeparator =
+                std::any_of(near.begin(), near.end(), [&](int j) { return place[j] >= begin(strip + 1); });
+            const int fromLast = strip > 0 ? k - begin(strip) : n;
+            const int toNext = strip < strips - 1 ? begin(strip + 1) - k : n;
+            result.partOf[order[k]] = isSeparator ? strips + strip : strip;
+            rank[order[k]] = isSeparator ? 0 : -std::min(fromLast, toNext);
+        }
+    std::stable_sort(result.order.begin(), result.order.end(), [&](int a, int b) {
+        return std::pair(result.partOf[a], rank[a]) < std::pair(result.partOf[b], rank[b]);
+    });
+    return result;
+}
+
+/// The same order but for steps that do not need one another: in each part, vertices by the length of the longest chain
+/// of earlier neighbours. An incomplete factor stays the same; a processor can work on several rows at once.
+void sortByLevel(const Neighbours& neighbours, Division& division) {
+    std::vector<int>& order = division.order;
+    const std::vector<int>& part = division.partOf;
+    std::vector<int> place(order.size()), level(order.size());
     for (std::size_t k = 0; k < order.size(); ++k) place[order[k]] = static_cast<int>(k);
     for (const int i : order)
         for (const int j : neighbours[i])
-            if (place[j] < place[i]) level[i] = std::max(level[i], level[j] + 1);
-    std::vector<int> sorted = order;
-    std::stable_sort(sorted.begin(), sorted.end(), [&](int a, int b) { return level[a] < level[b]; });
-    for (std::size_t k = 0; k < sorted.size(); ++k) rowOf[sorted[k]] = static_cast<int>(k);
-    return rowOf;
+            if (part[j] == part[i] && place[j] < place[i]) level[i] = std::max(level[i], level[j] + 1);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](int a, int b) { return std::pair(part[a], level[a]) < std::pair(part[b], level[b]); });
 }
 
-JACKET_KERNEL void multiplyKernel(const CompactMatrix::View& view, const float* x, float* y) {
+JACKET_KERNEL void multiplyKernel(const CompactMatrix::View& view, int begin, int end, const float* x, float* y) {
     const CompactMatrix::View a = view;  // nobody writes there
-    for (int i = 0; i < a.size; ++i) {
+    for (int i = begin; i < end; ++i) {
         const Float4 xi = load4(x + 4 * i);
-        Float4 sum = times(a.rowSums + 9 * i, xi), other{};
+        Float4 sum = times(a.rowSums + 9 * i, xi), even{}, odd{};  // two sums: shorter chains of additions
         for (int k = a.rowStart[i]; k < a.rowStart[i + 1]; ++k)
             sum += times(a.blocks + 9 * k, load4(x + 4 * a.column[k]) - xi);
-        for (int k = a.besideStart[i]; k < a.besideStart[i + 1]; ++k) {
-            float* yj = y + 4 * a.besideColumn[k];  // an earlier row: already written
-            const Float4 pull = a.beside[k] * a.besideFactor * (load4(x + 4 * a.besideColumn[k]) - xi);
-            other += pull;
-            store4(yj, load4(yj) - pull);
+        int k = a.besideStart[i];
+        const int besideEnd = a.besideStart[i + 1];
+        for (; k + 1 < besideEnd; k += 2) {
+            even += a.beside[k] * (load4(x + 4 * a.besideColumn[k]) - xi);
+            odd += a.beside[k + 1] * (load4(x + 4 * a.besideColumn[k + 1]) - xi);
         }
-        store4(y + 4 * i, xyz0(sum) + other);
+        if (k < besideEnd) even += a.beside[k] * (load4(x + 4 * a.besideColumn[k]) - xi);
+        store4(y + 4 * i, xyz0(sum) + a.besideFactor * (even + odd));
     }
 }
 
@@ -98,17 +146,22 @@ JACKET_KERNEL void multiplyKernel(const CompactMatrix::View& view, const float* 
 
 CompactMatrix::CompactMatrix(const BlockMatrix& matrix) : m_size(matrix.size()) {
     const Neighbours neighbours = neighboursIn(matrix);
-    m_rowOf = rowsByLevel(neighbours, cuthillMcKee(neighbours));
-    std::vector<int> vertexOf(m_size);
-    for (int i = 0; i < m_size; ++i) vertexOf[m_rowOf[i]] = i;
+    Division division = divide(neighbours, cuthillMcKee(neighbours));
+    sortByLevel(neighbours, division);
+    m_partStart.assign(2 * division.strips, 0);
+    for (const int part : division.partOf) ++m_partStart[part + 1];
+    std::partial_sum(m_partStart.begin(), m_partStart.end(), m_partStart.begin());
+    m_vertexOf = std::move(division.order);
+    m_rowOf.resize(m_size);
+    for (int row = 0; row < m_size; ++row) m_rowOf[m_vertexOf[row]] = row;
     m_rowStart.assign(1, 0);
     for (int row = 0; row < m_size; ++row) {
-        const int i = vertexOf[row];
+        const int i = m_vertexOf[row];
         const auto first = static_cast<std::ptrdiff_t>(m_column.size());
         for (const int j : neighbours[i]) m_column.push_back(m_rowOf[j]);
         std::sort(m_column.begin() + first, m_column.end());
         for (auto k = static_cast<std::size_t>(first); k < m_column.size(); ++k) {
-            const int j = vertexOf[m_column[k]];
+            const int j = m_vertexOf[m_column[k]];
             m_source.push_back(i > j ? matrix.slot(i, j) : ~matrix.slot(j, i));
         }
         m_rowStart.push_back(static_cast<int>(m_column.size()));
@@ -127,15 +180,13 @@ void CompactMatrix::takeBeside(const ConstantHessian* scalars) {
     m_besideColumn.clear();
     m_beside.clear();
     if (!scalars) return;
-    std::vector<int> vertexOf(m_size);
-    for (int i = 0; i < m_size; ++i) vertexOf[m_rowOf[i]] = i;
     std::vector<std::pair<int, float>> entries;
     for (int row = 0; row < m_size; ++row) {
         entries.clear();
-        for (ConstantHessian::InnerIterator it(*scalars, vertexOf[row]); it; ++it) {
+        for (ConstantHessian::InnerIterator it(*scalars, m_vertexOf[row]); it; ++it) {
             const int column = m_rowOf[it.col()];
             m_besideSums[row] += it.value();
-            if (column < row) entries.emplace_back(column, static_cast<float>(it.value()));
+            entries.emplace_back(column, static_cast<float>(it.value()));
         }
         std::sort(entries.begin(), entries.end());
         for (const auto& [column, value] : entries) {
@@ -146,14 +197,18 @@ void CompactMatrix::takeBeside(const ConstantHessian* scalars) {
     }
 }
 
-bool CompactMatrix::setValues(const BlockMatrix& matrix) {
+bool CompactMatrix::setValues(const BlockMatrix& matrix, WorkerTeam* team) {
     const Eigen::Index count = matrix.beside() ? matrix.beside()->nonZeros() : 0;
     const bool isNew = matrix.beside() != m_besideSource || count != m_besideCount;
     if (isNew) takeBeside(matrix.beside());
     m_besideFactor = matrix.besideFactor();
-    for (int i = 0; i < m_size; ++i) {
-        const int row = m_rowOf[i];
-        Mat3 sum = matrix.diagonal()[i];
+    runRanges(team, m_size, kRowsAtATime, [&](int begin, int end) { takeRows(matrix, begin, end); });
+    return isNew;
+}
+
+void CompactMatrix::takeRows(const BlockMatrix& matrix, int begin, int end) {
+    for (int row = begin; row < end; ++row) {
+        Mat3 sum = matrix.diagonal()[m_vertexOf[row]];
         sum.diagonal().array() += matrix.besideFactor() * m_besideSums[row];
         for (int k = m_rowStart[row]; k < m_rowStart[row + 1]; ++k) {
             const int source = m_source[k];
@@ -163,11 +218,10 @@ bool CompactMatrix::setValues(const BlockMatrix& matrix) {
         }
         Eigen::Map<Eigen::Matrix3f>(m_rowSums.data() + 9 * row) = sum.cast<float>();
     }
-    return isNew;
 }
 
-void CompactMatrix::multiply(const float* x, float* y) const {
-    multiplyKernel(view(), x, y);
+void CompactMatrix::multiply(const float* x, float* y, WorkerTeam* team) const {
+    runRanges(team, m_size, kRowsAtATime, [&](int begin, int end) { multiplyKernel(view(), begin, end, x, y); });
 }
 
 }  // namespace jacket

@@ -1,6 +1,7 @@
 #pragma once
 #include <vector>
 
+#include "jacket/WorkerTeam.h"
 #include "solver/BlockMatrix.h"
 
 namespace jacket {
@@ -18,19 +19,25 @@ class CompactMatrix {
     explicit CompactMatrix(const BlockMatrix& matrix);
     /// Takes the values of a matrix with that pattern. What stands beside its blocks is taken once, and again only when
     /// another matrix of scalars stands there: then it returns true.
-    bool setValues(const BlockMatrix& matrix);
+    bool setValues(const BlockMatrix& matrix, WorkerTeam* team = nullptr);
 
     int size() const { return m_size; }
     /// Row of each vertex. Neighbours are close to each other (reverse Cuthill-McKee), and rows that do not need one
     /// another in a triangular solve follow on each other.
     const std::vector<int>& rowOf() const { return m_rowOf; }
+    const std::vector<int>& vertexOf() const { return m_vertexOf; }  ///< of each row
+    /// Rows come in strips across the shell and then in the separators between them, one fewer. No row of a strip has a
+    /// block with another strip's, nor one of a separator with another separator's. Small shells are one strip.
+    int stripCount() const { return (static_cast<int>(m_partStart.size())) / 2; }
+    /// First row of each strip, then of each separator, then the number of rows.
+    const std::vector<int>& partStarts() const { return m_partStart; }
     /// Blocks of a row: all columns but the row's own, in rising order.
     int rowBegin(int row) const { return m_rowStart[row]; }
     int rowEnd(int row) const { return m_rowStart[row + 1]; }
     int column(int k) const { return m_column[k]; }
     /// Where block k comes from: a slot of the block matrix, or ~slot of the transposed one.
     int source(int k) const { return m_source[k]; }
-    /// Scalars beside the blocks: columns before the row's own, without their common factor.
+    /// Scalars beside the blocks, without their common factor: all columns in rising order, none the row's own.
     int besideBegin(int row) const { return m_besideStart[row]; }
     int besideEnd(int row) const { return m_besideStart[row + 1]; }
     int besideColumn(int k) const { return m_besideColumn[k]; }
@@ -56,12 +63,14 @@ class CompactMatrix {
     }
 
     /// y = A x; four floats a row, the last of them 0. They must not overlap.
-    void multiply(const float* x, float* y) const;
+    void multiply(const float* x, float* y, WorkerTeam* team = nullptr) const;
 
   private:
     void takeBeside(const ConstantHessian* scalars);
+    void takeRows(const BlockMatrix& matrix, int begin, int end);
     int m_size;
-    std::vector<int> m_rowOf, m_rowStart, m_column, m_source;
+    std::vector<int> m_partStart;
+    std::vector<int> m_rowOf, m_vertexOf, m_rowStart, m_column, m_source;
     std::vector<float> m_blocks, m_rowSums;
     const ConstantHessian* m_besideSource = nullptr;
     Eigen::Index m_besideCount = 0;  ///< entries when it was taken

@@ -40,7 +40,7 @@ void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t 
     addRows(system, part);
     filterBlocks(system, part);
     if (system.precision() == Precision::Single) {
-        part.matrix->compact().factor.factor(m_diagonal, m_lower);
+        part.matrix->compact().factor.factor(m_diagonal, m_lower, system.team());
         buildCoarse(system, part);
         return;
     }
@@ -68,7 +68,7 @@ void CoupledPreconditioner::buildCoarse(const CoupledSystem& system, const Coupl
         for (int a = 0; a < 3; ++a) tie.rows[a] = rowOf[row.vertices[a] - part.offset];
         m_ties.push_back(tie);
     }
-    compact.coarse->build(compact.matrix, *part.positions, m_free, m_ties);
+    compact.coarse->build(compact.matrix, *part.positions, m_free, m_ties, system.team());
 }
 
 bool CoupledPreconditioner::isCoarse(const CoupledSystem& system) const {
@@ -175,11 +175,8 @@ void CoupledPreconditioner::apply(const CoupledSystem& system, const CoupledVect
 
 void CoupledPreconditioner::apply(const CoupledSystem& system, const CompactVector& r, CompactVector& z) const {
     for (const auto& part : system.shells()) {
-        const CompactShell& compact = part.matrix->compact();
-        const float* from = r.s.data() + 4 * static_cast<std::size_t>(part.offset);
-        float* to = z.s.data() + 4 * static_cast<std::size_t>(part.offset);
-        compact.factor.apply(from, to);
-        if (compact.coarse) compact.coarse->addTo(from, to);
+        const std::size_t first = 4 * static_cast<std::size_t>(part.offset);
+        part.matrix->compact().precondition(r.s.data() + first, z.s.data() + first, system.team());
     }
     applyToBodies(r.w, z.w);
     system.filter(z);

@@ -5,6 +5,11 @@
 #include "solver/CompactShell.h"
 
 namespace jacket {
+namespace {
+
+constexpr int kVerticesAtATime = 2048, kConstraintsAtATime = 512;  ///< that a thread of a team takes
+
+}  // namespace
 
 void CoupledVector::resize(int vertices, int bodies) {
     s.setZero(3, vertices);
@@ -31,7 +36,8 @@ Mat6 pointStiffness(const Mat3& k, const Vec3& arm) {
 }
 
 void CoupledSystem::begin(std::vector<ShellPart> shells, int vertexCount, std::vector<Mat6> mass,
-                          std::vector<Vec6> freeTwist, std::vector<BodyCoupling> couplings, Precision precision) {
+                          std::vector<Vec6> freeTwist, std::vector<BodyCoupling> couplings, Precision precision,
+                          WorkerTeam* team) {
     m_shells = std::move(shells);
     m_vertexCount = vertexCount;
     m_mass = std::move(mass);
@@ -43,11 +49,12 @@ void CoupledSystem::begin(std::vector<ShellPart> shells, int vertexCount, std::v
     m_constraints.clear();
     m_rows.clear();
     m_precision = precision;
+    m_team = team;
     if (precision == Precision::Double) return;
     m_compactPlaces.resize(vertexCount);
     for (const auto& shell : m_shells) {
         CompactShell& compact = shell.matrix->compact();
-        if (compact.matrix.setValues(*shell.matrix)) compact.coarse.reset();
+        if (compact.matrix.setValues(*shell.matrix, m_team)) compact.coarse.reset();
         for (int i = 0; i < shell.matrix->size(); ++i)
             m_compactPlaces[shell.offset + i] = shell.offset + compact.matrix.rowOf()[i];
     }
@@ -83,7 +90,14 @@ void CoupledSystem::velocities(const CoupledVector& u, Points& v) const {
 }
 
 void CoupledSystem::multiply(const Points& v, Points& q) const {
-    for (const auto& shell : m_shells) shell.matrix->multiply(v.data() + 3 * shell.offset, q.data() + 3 * shell.offset);
+    for (const auto& shell : m_shells) {
+        const double* from = v.data() + 3 * shell.offset;
+        double* to = q.data() + 3 * shell.offset;
+        if (m_precision == Precision::Single)
+            shell.matrix->compact().product.multiply(*shell.matrix, from, to, m_team);
+        else
+            shell.matrix->multiply(from, to);
+    }
 }
 
 Vec3 CoupledSystem::rowVelocity(const SoftRow& row, const Points& v,
@@ -148,7 +162,7 @@ void CoupledSystem::apply(CompactVector& u, CompactVector& q) const {
         v += (c.tie * pointVelocity(u.w.col(c.body), c.arm)).cast<float>();
     }
     for (const auto& shell : m_shells)
-        shell.matrix->compact().matrix.multiply(u.s.data() + 4 * shell.offset, q.s.data() + 4 * shell.offset);
+        shell.matrix->compact().matrix.multiply(u.s.data() + 4 * shell.offset, q.s.data() + 4 * shell.offset, m_team);
     momentum(u.w, q.w);
     for (const auto& row : m_rows) {
         Vec3 velocity = Vec3::Zero();
@@ -159,6 +173,7 @@ void CoupledSystem::apply(CompactVector& u, CompactVector& q) const {
         for (int a = 0; a < 3; ++a) at(q.s, m_compactPlaces[row.vertices[a]]) += (row.weights[a] * f).cast<float>();
         if (row.body >= 0) q.w.col(row.body) -= pointImpulse(f, row.arm);
     }
+    if (bodyCount() == 0) return filter(q);
     std::size_t saved = 0;
     for (const auto& c : m_constraints) {
         auto force = at(q.s, m_compactPlaces[c.vertex]);
@@ -171,14 +186,18 @@ void CoupledSystem::apply(CompactVector& u, CompactVector& q) const {
 }
 
 void CoupledSystem::filter(CompactVector& u) const {
-    for (const auto& c : m_constraints) {
-        auto v = at(u.s, m_compactPlaces[c.vertex]);
-        v = (c.free * v.cast<double>()).cast<float>();
-    }
+    runRanges(m_team, static_cast<int>(m_constraints.size()), kConstraintsAtATime, [&](int begin, int end) {
+        for (int i = begin; i < end; ++i) {
+            auto v = at(u.s, m_compactPlaces[m_constraints[i].vertex]);
+            v = (m_constraints[i].free * v.cast<double>()).cast<float>();
+        }
+    });
 }
 
 void CoupledSystem::round(const CoupledVector& u, CompactVector& result) const {
-    for (int i = 0; i < m_vertexCount; ++i) at(result.s, m_compactPlaces[i]) = u.s.col(i).cast<float>();
+    runRanges(m_team, m_vertexCount, kVerticesAtATime, [&](int begin, int end) {
+        for (int i = begin; i < end; ++i) at(result.s, m_compactPlaces[i]) = u.s.col(i).cast<float>();
+    });
     result.w = u.w;
 }
 

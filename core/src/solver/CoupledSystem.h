@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "jacket/Contact.h"
+#include "jacket/WorkerTeam.h"
 #include "solver/BlockMatrix.h"
 
 namespace jacket {
@@ -83,9 +84,11 @@ class CoupledSystem {
         const Points* positions = nullptr;  ///< for a coarse space; null: without
     };
 
-    /// `couplings`: off-diagonal blocks of the mass, between dynamic bodies by their index here.
+    /// `couplings`: off-diagonal blocks of the mass, between dynamic bodies by their index here. `team` may help with
+    /// whatever is done with this system until the next begin.
     void begin(std::vector<ShellPart> shells, int vertexCount, std::vector<Mat6> mass, std::vector<Vec6> freeTwist,
-               std::vector<BodyCoupling> couplings = {}, Precision precision = Precision::Double);
+               std::vector<BodyCoupling> couplings = {}, Precision precision = Precision::Double,
+               WorkerTeam* team = nullptr);
     /// Replaces the bodies' masses and free twists.
     void setBodies(const std::vector<Mat6>& mass, const std::vector<Vec6>& freeTwist,
                    const std::vector<BodyCoupling>& couplings) {
@@ -103,6 +106,7 @@ class CoupledSystem {
         return m_constraintOf[vertex] < 0 ? nullptr : &m_constraints[m_constraintOf[vertex]];
     }
     Precision precision() const { return m_precision; }
+    WorkerTeam* team() const { return m_team; }  ///< that shares the work; null: none
     /// Place of each vertex in a CompactVector.
     const std::vector<int>& compactPlaces() const { return m_compactPlaces; }
     int vertexCount() const { return m_vertexCount; }
@@ -146,6 +150,7 @@ class CoupledSystem {
     std::vector<SoftRow> m_rows;
     std::vector<int> m_constraintOf;
     Precision m_precision = Precision::Double;
+    WorkerTeam* m_team = nullptr;
     std::vector<int> m_compactPlaces;
     mutable std::vector<Eigen::Vector3f> m_saved;
     mutable Points m_v, m_q;

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "Kernel.h"
 
 namespace jacket {
 namespace {
+
+constexpr int kFloatsAtATime = 8192;  ///< that a thread of a team takes: a multiple of four
 
 using Double4 = double __attribute__((vector_size(32)));
 
@@ -34,10 +37,6 @@ JACKET_KERNEL void turnKernel(std::size_t size, float beta, const float* z, floa
     for (std::size_t i = 0; i < size; i += 4) store4(d + i, load4(z + i) + beta * load4(d + i));
 }
 
-double dot(const CompactVector& a, const CompactVector& b) {
-    return dotKernel(a.s.size(), a.s.data(), b.s.data()) + a.w.cwiseProduct(b.w).sum();
-}
-
 }  // namespace
 
 void FilteredPcg::resize(const CoupledSystem& system) {
@@ -54,6 +53,16 @@ void FilteredPcg::resize(const CoupledSystem& system) {
         if (v->s.size() != m_change.size() || v->w.cols() != bodies) v->resize(n, bodies);
 }
 
+/// Range by range, then in order: the same for any number of threads.
+double FilteredPcg::dot(WorkerTeam* team, const CompactVector& a, const CompactVector& b) {
+    const int size = static_cast<int>(a.s.size());
+    m_partSums.resize((size + kFloatsAtATime - 1) / kFloatsAtATime);
+    runRanges(team, size, kFloatsAtATime, [&](int begin, int end) {
+        m_partSums[begin / kFloatsAtATime] = dotKernel(end - begin, a.s.data() + begin, b.s.data() + begin);
+    });
+    return std::accumulate(m_partSums.begin(), m_partSums.end(), 0.0) + a.w.cwiseProduct(b.w).sum();
+}
+
 /// Of m_r, into m_z; returns r^T P^-1 r.
 double FilteredPcg::precondition(const CoupledSystem& system, const CoupledPreconditioner& preconditioner) {
     if (system.precision() == Precision::Double) {
@@ -62,7 +71,7 @@ double FilteredPcg::precondition(const CoupledSystem& system, const CoupledPreco
     }
     system.round(m_r, m_compactR);
     preconditioner.apply(system, m_compactR, m_compactZ);
-    return m_rho = dot(m_compactR, m_compactZ);
+    return m_rho = dot(system.team(), m_compactR, m_compactZ);
 }
 
 double FilteredPcg::begin(const CoupledSystem& system, const CoupledPreconditioner& preconditioner,
@@ -120,22 +129,27 @@ double FilteredPcg::iterate(const CoupledSystem& system, const CoupledPreconditi
 void FilteredPcg::iterateCompact(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho,
                                  double target, int maxIterations, int& iterations, CoupledVector& u) {
     constexpr double kMargin = 0.9;  // the residual as the iterations know it is not quite the true one
-    const std::size_t size = m_change.size();
+    WorkerTeam* const team = system.team();
+    const int size = static_cast<int>(m_change.size());
     CompactVector &r = m_compactR, &z = m_compactZ, &d = m_compactD, &q = m_compactQ;
     std::fill(m_change.begin(), m_change.end(), 0.0);
     d.s = z.s;
     d.w = z.w;
     while (!(rho <= kMargin * target) && iterations < maxIterations) {
         system.apply(d, q);
-        const double curvature = dot(d, q);
+        const double curvature = dot(team, d, q);
         if (!(curvature > 0.0)) break;  // lost to rounding, or not finite
         const double alpha = rho / curvature;
-        stepKernel(size, alpha, d.s.data(), q.s.data(), m_change.data(), r.s.data());
+        runRanges(team, size, kFloatsAtATime, [&](int i, int end) {
+            stepKernel(end - i, alpha, d.s.data() + i, q.s.data() + i, m_change.data() + i, r.s.data() + i);
+        });
         u.w += alpha * d.w;
         r.w -= alpha * q.w;
         preconditioner.apply(system, r, z);
-        const double next = dot(r, z);
-        turnKernel(size, static_cast<float>(next / rho), z.s.data(), d.s.data());
+        const double next = dot(team, r, z);
+        runRanges(team, size, kFloatsAtATime, [&](int i, int end) {
+            turnKernel(end - i, static_cast<float>(next / rho), z.s.data() + i, d.s.data() + i);
+        });
         d.w = z.w + (next / rho) * d.w;
         rho = next;
         ++iterations;

@@ -34,6 +34,7 @@ class FilteredPcg {
 
   private:
     void resize(const CoupledSystem& system);
+    double dot(WorkerTeam* team, const CompactVector& a, const CompactVector& b);
     double precondition(const CoupledSystem& system, const CoupledPreconditioner& preconditioner);
     double iterate(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho, double target,
                    int maxIterations, int& iterations, CoupledVector& u);
@@ -42,7 +43,8 @@ class FilteredPcg {
     CoupledVector m_r, m_z, m_d, m_q, m_before;
     double m_rho = 0.0;  ///< r^T P^-1 r of m_r
     CompactVector m_compactR, m_compactZ, m_compactD, m_compactQ;
-    std::vector<double> m_change;  ///< of u.s, four a vertex as in a CompactVector
+    std::vector<double> m_partSums;  ///< of a dot product
+    std::vector<double> m_change;    ///< of u.s, four a vertex as in a CompactVector
     Points m_unfiltered;
 };
 

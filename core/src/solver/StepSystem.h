@@ -2,6 +2,7 @@
 #include <array>
 #include <vector>
 
+#include "jacket/WorkerTeam.h"
 #include "jacket/models/StencilModel.h"
 #include "solver/BlockMatrix.h"
 
@@ -33,6 +34,10 @@ class StepSystem {
   public:
     BlockMatrix matrix;
     Points rhs;
+
+    /// Threads that may share long loops over the system until this is called again; null: none.
+    void setTeam(WorkerTeam* team) { m_team = team; }
+    WorkerTeam* team() const { return m_team; }
 
     /// `constant` must outlive the system.
     void begin(double h, double stiffnessDamping, const ConstantPart* constant = nullptr) {
@@ -130,6 +135,7 @@ class StepSystem {
         }
     }
 
+    WorkerTeam* m_team = nullptr;
     double m_h = 0.0, m_stiffnessFactor = 0.0;
     Points m_scratch;
 };

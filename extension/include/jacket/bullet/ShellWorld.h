@@ -57,6 +57,11 @@ class ShellWorld : public btActionInterface {
 
     void setWind(const Wind& wind);
     void clearWind();
+    /// How many threads share the solve of a large shell (1000 vertices or more, and no free body touches it), the one
+    /// that steps the world included. Any number gives the same bits; more than there are processors gain nothing. 1,
+    /// as it is at first, starts none. Throws std::invalid_argument below 1.
+    void setThreads(int threads);
+    int threads() const;
     const WorldReport& lastStep() const { return m_report; }
     /// Things the user should know once, e.g. a shape that shells cannot touch. Kept until read.
     std::vector<std::string> takeWarnings();

@@ -1,0 +1,79 @@
+#include "solver/BlockProduct.h"
+
+#include "Kernel.h"
+
+namespace jacket {
+namespace {
+
+constexpr int kRowsAtATime = 512;
+
+struct Blocks {
+    const int *lowerStart, *lowerColumn, *upperStart, *upperRow, *upperSlot;
+    const double *diagonal, *lower;  ///< nine numbers a block, by columns
+    const int *besideStart, *besideColumn;
+    const double* beside;
+    double besideFactor;
+};
+
+JACKET_KERNEL void multiplyKernel(const Blocks& blocks, int begin, int end, const double* x, double* y) {
+    const Blocks b = blocks;  // nobody writes there
+    for (int i = begin; i < end; ++i) {
+        double sum[3], beside[3] = {};
+        const double *d = b.diagonal + 9 * i, *xi = x + 3 * i;
+        for (int c = 0; c < 3; ++c) sum[c] = d[c] * xi[0] + d[3 + c] * xi[1] + d[6 + c] * xi[2];
+        for (int k = b.lowerStart[i]; k < b.lowerStart[i + 1]; ++k) {
+            const double *a = b.lower + 9 * k, *xj = x + 3 * b.lowerColumn[k];
+            for (int c = 0; c < 3; ++c) sum[c] += a[c] * xj[0] + a[3 + c] * xj[1] + a[6 + c] * xj[2];
+        }
+        for (int k = b.upperStart[i]; k < b.upperStart[i + 1]; ++k) {
+            const double *a = b.lower + 9 * b.upperSlot[k], *xj = x + 3 * b.upperRow[k];
+            for (int c = 0; c < 3; ++c) sum[c] += a[3 * c] * xj[0] + a[3 * c + 1] * xj[1] + a[3 * c + 2] * xj[2];
+        }
+        if (b.beside)
+            for (int k = b.besideStart[i]; k < b.besideStart[i + 1]; ++k)
+                for (int c = 0; c < 3; ++c) beside[c] += b.beside[k] * x[3 * b.besideColumn[k] + c];
+        for (int c = 0; c < 3; ++c) y[3 * i + c] = sum[c] + b.besideFactor * beside[c];
+    }
+}
+
+}  // namespace
+
+BlockProduct::BlockProduct(const BlockMatrix& matrix)
+    : m_lowerStart(1, 0),
+      m_upperStart(matrix.size() + 1, 0),
+      m_upperRow(matrix.lower().size()),
+      m_upperSlot(matrix.lower().size()) {
+    for (int i = 0; i < matrix.size(); ++i) {
+        for (int k = matrix.rowBegin(i); k < matrix.rowEnd(i); ++k) {
+            m_lowerColumn.push_back(matrix.column(k));
+            ++m_upperStart[matrix.column(k) + 1];
+        }
+        m_lowerStart.push_back(matrix.rowEnd(i));
+    }
+    for (int i = 0; i < matrix.size(); ++i) m_upperStart[i + 1] += m_upperStart[i];
+    std::vector<int> next(m_upperStart.begin(), m_upperStart.end() - 1);
+    for (int i = 0; i < matrix.size(); ++i)
+        for (int k = matrix.rowBegin(i); k < matrix.rowEnd(i); ++k) {
+            const int place = next[matrix.column(k)]++;
+            m_upperRow[place] = i;
+            m_upperSlot[place] = k;
+        }
+}
+
+void BlockProduct::multiply(const BlockMatrix& matrix, const double* x, double* y, WorkerTeam* team) const {
+    const ConstantHessian* beside = matrix.beside();
+    const Blocks blocks{m_lowerStart.data(),
+                        m_lowerColumn.data(),
+                        m_upperStart.data(),
+                        m_upperRow.data(),
+                        m_upperSlot.data(),
+                        matrix.diagonal().data()->data(),
+                        matrix.lower().empty() ? nullptr : matrix.lower().data()->data(),
+                        beside ? beside->outerIndexPtr() : nullptr,
+                        beside ? beside->innerIndexPtr() : nullptr,
+                        beside ? beside->valuePtr() : nullptr,
+                        matrix.besideFactor()};
+    runRanges(team, matrix.size(), kRowsAtATime, [&](int begin, int end) { multiplyKernel(blocks, begin, end, x, y); });
+}
+
+}  // namespace jacket
