@@ -5,6 +5,7 @@
 
 #include "Json.h"
 #include "RunProgram.h"
+#include "SceneFile.h"
 #include "TemporaryFolder.h"
 
 namespace jacket::demo {
@@ -69,6 +70,18 @@ TEST(Program, EndsInTheSameStateWithAnyNumberOfThreads) {
         return result["state"];
     };
     EXPECT_EQ(stateWith("1"), stateWith("3"));
+}
+
+/// Exit code 4 is a motion that ended in numbers that are none; 3, steps that did not converge.
+TEST(BundledScenes, RunToTheirEnds) {
+    const TemporaryFolder folder;
+    for (const fs::path& scene : bundledScenes()) {
+        const Outcome run = jacket({"run", scene.stem().string(), "--quiet", "--out", folder / "out"});
+        EXPECT_TRUE(run.exitCode == 0 || run.exitCode == 3)
+            << scene << " ended with " << run.exitCode << ": " << run.err;
+        const Json result = parseJson(readText(folder / "out" / "result.json"), "result.json");
+        EXPECT_LT(result.at("peak_stretch").get<double>(), 0.5) << scene;
+    }
 }
 
 TEST(Program, SettlesAStaticScene) {

@@ -37,8 +37,9 @@ const ContactResponse::Memory* ContactResponse::remembered(const Contact& c) con
     const auto first = m_memory.lower_bound({std::get<0>(key), std::get<1>(key), 0});
     for (auto other = first; other != m_memory.end(); ++other) {
         if (std::get<0>(other->first) != std::get<0>(key) || std::get<1>(other->first) != std::get<1>(key)) break;
+        if (other->second.isVertex) continue;
         const double distance = (other->second.point - c.point).norm();
-        if (other->second.isVertex || distance >= least) continue;
+        if (distance >= least) continue;
         least = distance;
         nearest = &other->second;
     }
