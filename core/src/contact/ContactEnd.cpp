@@ -92,6 +92,13 @@ bool ContactResponse::closeFirst(int round) {
     return true;
 }
 
+/// From a free body's centre of mass to the contact, when the step is over: how the gap changes with the body's spin is
+/// to be right there. A ball that rolls would else be held back by the face that it rolls onto.
+Vec3 ContactResponse::armAtEnd(const Contact& contact) const {
+    const Vec3 moved = m_input.h * m_endTwists[contact.body].head<3>();
+    return contact.point - (m_input.bodies[contact.body].position + moved);
+}
+
 /// What a contact at the end of the step lacks to where it may be, < 0: it stands deeper [m]. `touch`: the one that it
 /// belongs to, or -1.
 double ContactResponse::missing(const Contact& contact, int touch) const {
@@ -156,6 +163,7 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     const Vec3 firstNormal = touch.contact.normal;
     const double firstGap = touch.contact.gap;
     place(touch, contact);
+    if (touch.dynamicBody >= 0) touch.arm = armAtEnd(contact);
     if (turned) {
         touch.contact.normal = firstNormal;
         touch.contact.gap = firstGap;

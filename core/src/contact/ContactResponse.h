@@ -164,6 +164,7 @@ class ContactResponse {
     bool closeFound(const IslandVelocities& solved, int round);
     bool isAnyDeep() const;
     double missing(const Contact& contact, int touch) const;
+    Vec3 armAtEnd(const Contact& contact) const;
     void relaxDamping();
     void dropExcessFriction();
     double updateSticking(Touch& touch, double matters, double stiffness) const;
