@@ -170,12 +170,21 @@ void ContactResponse::addAtStart(const Contact& contact, const std::map<int, dou
         touch.active = touch.active || (memory->impulse > 0.0 && touch.contact.gap < 10.0 * m_vertexSlop);
     }
     const auto [known, fresh] = m_index.try_emplace(keyOf(contact), static_cast<int>(m_touches.size()));
-    if (!fresh && m_touches[known->second].contact.gap <= touch.contact.gap) return;
+    if (!fresh && !isRather(touch, m_touches[known->second], memory)) return;
     if (touch.contact.gap < 0.0) alter(touch, y);
     if (fresh)
         m_touches.push_back(touch);
     else
         m_touches[known->second] = touch;
+}
+
+/// Of two contacts of one key: the deeper, but the one of the last step if that is nearly as deep. A body that rests in
+/// a fold would else be pushed by its two sides in turn for ever.
+bool ContactResponse::isRather(const Touch& touch, const Touch& other, const Memory* memory) const {
+    double lead = 0.0;
+    if (memory && touch.contact.vertices == memory->vertices) lead += m_faceSlop;
+    if (memory && other.contact.vertices == memory->vertices) lead -= m_faceSlop;
+    return touch.contact.gap < other.contact.gap + lead;
 }
 
 /// Per vertex the least gap of the faces and edges around it that have been found: as far as it may come down.
@@ -544,7 +553,8 @@ void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
                                               touch.sticks,
                                               touch.slip,
                                               touch.contact.point,
-                                              touch.contact.isVertex()};
+                                              touch.contact.isVertex(),
+                                              touch.contact.vertices};
     }
 }
 

@@ -114,6 +114,7 @@ class ContactResponse {
         Slip slip;
         Vec3 point;
         bool isVertex;
+        std::array<int, 3> vertices;
     };
     /// The contacts that share one vertex's filter entry: up to three normals, against bodies of prescribed motion, or
     /// one against a dynamic body.
@@ -145,6 +146,7 @@ class ContactResponse {
     bool closeFirst(int round);
     std::map<int, double> roomBesideFaces() const;
     void addAtStart(const Contact& contact, const std::map<int, double>& room, Points& y);
+    bool isRather(const Touch& touch, const Touch& other, const Memory* memory) const;
     void keepEarliest();
     void alter(Touch& touch, Points& y) const;
     std::vector<VertexConstraint> holdConstraints() const;
