@@ -34,10 +34,12 @@ const ContactResponse::Memory* ContactResponse::remembered(const Contact& c) con
     if (c.isVertex()) return nullptr;
     const Memory* nearest = nullptr;
     double least = kSameContact * m_edge[c.shell];
-    const auto first = m_memory.lower_bound({std::get<0>(key), std::get<1>(key), 0});
+    const HalfEdgeMesh& mesh = m_input.shells[c.shell]->mesh();
+    const auto& [shell, body, feature] = key;
+    const auto first = m_memory.lower_bound({shell, body, Feature::edge(0, mesh.vertexCount())});
     for (auto other = first; other != m_memory.end(); ++other) {
-        if (std::get<0>(other->first) != std::get<0>(key) || std::get<1>(other->first) != std::get<1>(key)) break;
-        if (other->second.isVertex) continue;
+        if (std::get<0>(other->first) != shell || std::get<1>(other->first) != body) break;
+        if (other->second.isVertex) break;  // beyond the faces: vertices between walls
         const double distance = (other->second.point - c.point).norm();
         if (distance >= least) continue;
         least = distance;
