@@ -204,6 +204,7 @@ void Bodies::addBody(BodyDescription& description) {
     }
     btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, entry.shape.get(), entry.inertia);
     info.m_friction = btScalar(description.friction);
+    info.m_restitution = btScalar(description.restitution);
     info.m_startWorldTransform = toBullet(description.transform) * entry.centre;
     entry.body = decltype(entry.body)(new btRigidBody(info), RemoveBody{&m_world});
     if (!m_scene.maySleep() || !description.kinematic.empty())

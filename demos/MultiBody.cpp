@@ -69,6 +69,7 @@ void MultiBody::addCollider(int link, const MultiBodyPart& part) {
     btMultiBodyLinkCollider& collider = *m_colliders.back();
     collider.setCollisionShape(part.shape);
     collider.setFriction(btScalar(part.description->friction));
+    collider.setRestitution(btScalar(part.description->restitution));
     collider.setActivationState(DISABLE_DEACTIVATION);
     collider.setWorldTransform(btTransform(btQuaternion::getIdentity(), toBullet(startOf(part))));
     if (link < 0)

@@ -75,6 +75,7 @@ struct ShellDescription {
     MembraneModel membrane;
     BendingModel bending;
     double friction = 0.5;         ///< [-]
+    double restitution = 0.0;      ///< 0 to 1 [-]
     double tolerance = 1e-3;       ///< of the linear solve, relative
     int maxIterations = 1000;      ///< of one linear solve
     double contactThickness = -1;  ///< [m]; < 0: half the thickness
@@ -106,6 +107,7 @@ struct BodyDescription {
     Vec3 velocity = Vec3::Zero();         ///< [m/s]
     Vec3 angularVelocity = Vec3::Zero();  ///< [rad/s]
     double friction = 0.5;                ///< [-]
+    double restitution = 0.0;             ///< 0 to 1 [-]
     std::vector<Kinematic> kinematic;     ///< phases, in order of time; empty: not kinematic
     bool isOfMultiBody = false;           ///< base or link of one of Scene::multiBodies
 };

@@ -17,41 +17,32 @@ using Names = std::vector<std::string>;
 constexpr std::array kSceneKeys{"name",        "description",     "dt",      "substeps", "seconds", "seed",
                                 "mode",        "load_increments", "gravity", "wind",     "shells",  "bodies",
                                 "multibodies", "probes",          "camera"};
-constexpr std::array kShellKeys{"name",
-                                "mesh",
-                                "initial_shape",
-                                "transform",
-                                "material",
-                                "membrane",
-                                "bending",
-                                "friction",
-                                "tolerance",
-                                "max_iterations",
-                                "pin",
-                                "clamp",
-                                "guide",
-                                "regions",
-                                "plasticity",
-                                "flatten_rest",
-                                "force",
-                                "pressure",
-                                "initial_velocity",
-                                "integrator",
-                                "contact_thickness",
-                                "perturbation",
-                                "self_collision",
+constexpr std::array kShellKeys{"name",           "mesh",
+                                "initial_shape",  "transform",
+                                "material",       "membrane",
+                                "bending",        "friction",
+                                "restitution",    "tolerance",
+                                "max_iterations", "pin",
+                                "clamp",          "guide",
+                                "regions",        "plasticity",
+                                "flatten_rest",   "force",
+                                "pressure",       "initial_velocity",
+                                "integrator",     "contact_thickness",
+                                "perturbation",   "self_collision",
                                 "sleeping"};
 constexpr std::array kBodyKeys{
-    "name", "shape", "mass", "position", "rotation_deg", "velocity", "angular_velocity", "friction", "kinematic"};
+    "name",     "shape",       "mass",     "position", "rotation_deg", "velocity", "angular_velocity",
+    "friction", "restitution", "kinematic"};
 constexpr std::array kMultiBodyKeys{"name", "base", "links"};
-constexpr std::array kBaseKeys{"shape", "mass", "position", "friction"};
-constexpr std::array kLinkKeys{"name",  "parent",   "shape", "mass",   "joint",
-                               "pivot", "position", "motor", "limits", "friction"};
+constexpr std::array kBaseKeys{"shape", "mass", "position", "friction", "restitution"};
+constexpr std::array kLinkKeys{"name",     "parent", "shape",  "mass",     "joint",      "pivot",
+                               "position", "motor",  "limits", "friction", "restitution"};
 constexpr std::array kProbeKeys{"name", "shell", "body", "box", "vertices", "quantity"};
 constexpr std::array kMaterialKeys{
     "preset",      "young",      "poisson",           "thickness",         "density",      "yield",
     "hardening",   "orthotropy", "stretch_stiffness", "bending_stiffness", "area_density", "stiffness_damping",
     "mass_damping"};
+constexpr Range kRestitution{.low = 0, .high = 1};
 
 /// Before anything else is said about an object: a misspelt key explains more than a missing one.
 void checkKeys(ObjectReader& in, std::span<const char* const> known) {
@@ -292,6 +283,7 @@ ShellDescription readShell(ObjectReader in, const fs::path& folder, std::size_t 
     shell.membrane = readModel<MembraneModel>(in, "membrane");
     shell.bending = readModel<BendingModel>(in, "bending");
     shell.friction = in.number("friction", Range::nonNegative(), shell.friction);
+    shell.restitution = in.number("restitution", kRestitution, shell.restitution);
     shell.tolerance = in.number("tolerance", Range{.low = 0, .includesLow = false, .high = 1}, shell.tolerance);
     shell.maxIterations = in.integer("max_iterations", 1, shell.maxIterations);
     shell.contactThickness = in.number("contact_thickness", Range::nonNegative("m"), shell.contactThickness);
@@ -399,6 +391,7 @@ BodyDescription readBody(ObjectReader in, const fs::path& folder, std::size_t in
     body.velocity = in.vector("velocity", Vec3::Zero());
     body.angularVelocity = in.vector("angular_velocity", Vec3::Zero());
     body.friction = in.number("friction", Range::nonNegative(), body.friction);
+    body.restitution = in.number("restitution", kRestitution, body.restitution);
     body.kinematic = readKinematic(in);
     checkBody(in, body);
     return body;
@@ -413,6 +406,7 @@ BodyDescription readJointedBody(ObjectReader& in, const fs::path& folder) {
     if (std::holds_alternative<Plane>(body.shape)) in.fail("shape", "is a plane, which cannot be jointed");
     body.transform.position = in.vector("position", Vec3::Zero());
     body.friction = in.number("friction", Range::nonNegative(), body.friction);
+    body.restitution = in.number("restitution", kRestitution, body.restitution);
     body.isOfMultiBody = true;
     return body;
 }

@@ -88,6 +88,7 @@ Json toJson(const ShellDescription& shell) {
     json["plasticity"] = shell.plasticity;
     json["flatten_rest"] = shell.flattenRest;
     json["friction"] = shell.friction;
+    json["restitution"] = shell.restitution;
     json["tolerance"] = shell.tolerance;
     json["max_iterations"] = shell.maxIterations;
     if (shell.contactThickness >= 0) json["contact_thickness"] = shell.contactThickness;
@@ -124,6 +125,7 @@ Json toJson(const BodyDescription& body) {
     json["velocity"] = demo::toJson(body.velocity);
     json["angular_velocity"] = demo::toJson(body.angularVelocity);
     json["friction"] = body.friction;
+    json["restitution"] = body.restitution;
     for (const auto& [velocity, until] : body.kinematic)
         json["kinematic"].push_back({{"velocity", demo::toJson(velocity)}, {"until", until}});
     return json;
@@ -133,7 +135,8 @@ Json jointedToJson(const BodyDescription& body) {
     return {{"shape", std::visit(ShapeToJson{}, body.shape)},
             {"mass", body.mass},
             {"position", demo::toJson(body.transform.position)},
-            {"friction", body.friction}};
+            {"friction", body.friction},
+            {"restitution", body.restitution}};
 }
 
 Json toJson(const Joint& joint) {

@@ -51,6 +51,7 @@ struct World::Impl {
         options.tolerance = description.tolerance;
         options.maxIterations = description.maxIterations;
         options.friction = description.friction;
+        options.restitution = description.restitution;
         options.contactThickness = description.contactThickness;
         options.integrator = description.integrator;
         options.plasticity = description.plasticity;

@@ -65,7 +65,7 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContact
         coupled.inner = std::min(coupled.inner, 0.5 * (piece->upper() - piece->lower()).minCoeff());
     const btRigidBody* rigid = btRigidBody::upcast(&object);
     if (const auto* link = btMultiBodyLinkCollider::upcast(&object)) {
-        coupled.freeTwist = twistOf(*link);
+        coupled.freeTwist = coupled.startTwist = twistOf(*link);
         coupled.prescribed = isPrescribed(*link);
         if (hasMoved) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
     } else if (!rigid || object.isStaticOrKinematicObject()) {
@@ -75,7 +75,8 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContact
     } else {
         const bool moves = rigid->isActive() && rigid->getInvMass() != btScalar(0);
         coupled.prescribed = !moves;
-        coupled.freeTwist = moves && !hasMoved ? freeTwistOf(*rigid, h) : twistOf(*rigid);
+        coupled.startTwist = twistOf(*rigid);
+        coupled.freeTwist = moves && !hasMoved ? freeTwistOf(*rigid, h) : coupled.startTwist;
         if (hasMoved) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
         coupled.position = obstacle.start.translation();
         if (moves && !hasMoved && m_gravityIsNoForce)

@@ -16,6 +16,9 @@ namespace {
 ShellSettings settingsOf(const ShellOptions& o) {
     if (!(o.friction >= 0.0))
         throw std::invalid_argument("ShellOptions.friction must be >= 0, got " + std::to_string(o.friction));
+    if (!(o.restitution >= 0.0 && o.restitution <= 1.0))
+        throw std::invalid_argument("ShellOptions.restitution must be from 0 to 1, got " +
+                                    std::to_string(o.restitution));
     return {.membrane = o.membrane,
             .bending = o.bending,
             .integrator = o.integrator,

@@ -49,7 +49,7 @@ struct ShellContacts::Query {
     const ShellBody& shellBody;
     const Points& x;
     Frame frame;  ///< of the obstacle
-    double vertexReach, faceReach, friction;
+    double vertexReach, faceReach;
     std::vector<Contact>& contacts;
     double thickness() const { return shellBody.contactThickness(); }
     bool wantsFaces() const { return faceReach > -std::numeric_limits<double>::infinity(); }
@@ -78,7 +78,6 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
                     moved(obstacle.start, pose.twists[body], pose.time),
                     std::min(vertexReach, obstacle.body.inner),  // beyond that its nearest point says nothing
                     faceReach,
-                    m_shells[shell]->options().friction * double(obstacle.object->getFriction()),
                     contacts};
         for (const auto& piece : obstacle.shape->pieces) {
             findVertices(query, *piece);
@@ -231,6 +230,15 @@ std::vector<int> ShellContacts::sidesOf(Sides& known, std::vector<SurfacePoint>&
     return sides;
 }
 
+/// What shell and body make of it together: the products, as Bullet combines them. A body that gives back more than it
+/// gets would do so without end.
+void ShellContacts::setMaterial(Contact& contact) const {
+    const ShellOptions& options = m_shells[contact.shell]->options();
+    const btCollisionObject& body = *m_obstacles[contact.body].object;
+    contact.friction = options.friction * double(body.getFriction());
+    contact.restitution = std::clamp(options.restitution * double(body.getRestitution()), 0.0, 1.0);
+}
+
 void ShellContacts::add(Query& query, int feature, const SurfacePoint& surface, const std::array<int, 3>& vertices,
                         const Vec3& weights) {
     Contact contact;
@@ -242,7 +250,7 @@ void ShellContacts::add(Query& query, int feature, const SurfacePoint& surface, 
     contact.normal = query.frame.linear() * surface.normal;
     contact.point = query.frame * surface.point;
     contact.gap = surface.distance - query.thickness();
-    contact.friction = query.friction;
+    setMaterial(contact);
     const auto [known, fresh] = m_byFeature.try_emplace(feature, query.contacts.size());
     if (fresh)
         query.contacts.push_back(contact);

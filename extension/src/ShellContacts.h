@@ -33,6 +33,7 @@ class ShellContacts final : public ContactDetector {
     void findConcave(Query& query, const ConcavePiece& piece, std::unique_ptr<TrianglePatch>& patch);
     void addFace(Query& query, int triangle, const TrianglePoint& touch);
     void addVertices(Query& query);
+    void setMaterial(Contact& contact) const;
     using Sides = std::vector<SurfacePoint>;
     static std::vector<int> sidesOf(Sides& known, std::vector<SurfacePoint>& surfaces);
 

@@ -108,7 +108,7 @@ void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& cont
                 if (!contact) continue;
                 contact->shell = shell;
                 contact->body = body;
-                contact->friction = m_shells[shell]->options().friction * double(obstacle.object->getFriction());
+                setMaterial(*contact);
                 contact->feature = Feature::triangle(t, mesh.vertexCount(), edgeCount);
                 int corner = 0;
                 if (contact->weights.maxCoeff(&corner) > kAtVertex) {

@@ -291,6 +291,7 @@ void ShellWorld::solveIsland(Island& island, double h) {
     input.rigidContacts = island.rigidContacts;
     input.anchors = island.anchors;
     input.contacts = island.pairs.empty() ? nullptr : &timed;
+    input.restingSpeed = double(m_world.getSolverInfo().m_restitutionVelocityThreshold);
     input.clock = &seconds;
     input.team = m_impl->team.get();
     const double start = seconds();

@@ -63,7 +63,7 @@ TEST_F(SceneTest, WrittenOutItGivesItselfAgain) {
                              "shells.0.material={\"preset\":\"paper\",\"yield\":1e7,\"orthotropy\":{\"weft_young\":2e9,"
                              "\"shear\":1e9,\"warp\":[0,0,1]}}",
                              "shells.0.integrator=bdf2", "shells.0.flatten_rest=true", "load_increments=4",
-                             "shells.0.sleeping=true",
+                             "shells.0.sleeping=true", "shells.0.restitution=0.5", "bodies.0.restitution=0.25",
                              "shells.0.clamp=[{\"vertices\":[0,1],\"direction\":[0,0,1]},{\"vertices\":[2,3]}]",
                              "shells.0.guide=[{\"vertices\":[4],\"direction\":[0,1,0]}]",
                              "shells.0.regions=[{\"box\":[[0,0,0],[1,1,1]],\"material\":\"steel\"}]",
@@ -127,8 +127,11 @@ TEST_F(SceneTest, MistakesInMultiBodiesAreNamed) {
 TEST_F(SceneTest, SetReplacesValuesByIndexAndByName) {
     const Scene scene =
         load(kScene, {"shells.sheet.friction=0.1", "bodies.0.mass=3", "shells.0.material.thickness=0.002",
-                      "shells.0.mesh.grid.cells.1=7", "shells.0.bending=quadratic"});
+                      "shells.0.mesh.grid.cells.1=7", "shells.0.bending=quadratic", "shells.0.restitution=0.5",
+                      "bodies.0.restitution=0.25"});
     EXPECT_EQ(scene.shells[0].friction, 0.1);
+    EXPECT_EQ(scene.shells[0].restitution, 0.5);
+    EXPECT_EQ(scene.bodies[0].restitution, 0.25);
     EXPECT_EQ(scene.bodies[0].mass, 3);
     EXPECT_EQ(scene.shells[0].material.thickness, 0.002);
     EXPECT_EQ(std::get<GridOptions>(scene.shells[0].mesh).cells, Eigen::Vector2i(4, 7));
@@ -145,6 +148,7 @@ TEST_F(SceneTest, EveryMistakeIsNamedWithItsPath) {
         {"shells.4.friction=1", "shells has no element \"4\": it has one element, 0"},
         {"shells.0.name.x=1", "shells.0.name is \"sheet\" and has no \"x\" in it"},
         {"shells.0.friction=rough", "shells.0.friction must be a number, got \"rough\""},
+        {"bodies.0.restitution=1.5", "bodies.0.restitution must be >= 0 and <= 1, got 1.5"},
         {"shells.0.material=cottn", "unknown material \"cottn\"; did you mean \"cotton\"?"},
         {"shells.0.bending=quadratc", "unknown model \"quadratc\"; did you mean \"quadratic\"?"},
         {"shells.0.membrane={\"model\":\"stvk\",\"shear\":1}", "shells.0.membrane.shear: unknown key \"shear\""},

@@ -19,10 +19,11 @@ struct BodySupport {
 
 /// A rigid body that takes part in the shells' solve. Twists are (velocity of the centre of mass, angular velocity).
 struct CoupledBody {
-    Vec3 position = Vec3::Zero();   ///< centre of mass at the start of the step [m]
-    Mat6 mass = Mat6::Zero();       ///< blockdiag(m I, R I R^T), and the stiff terms of its supports
-    Vec6 freeTwist = Vec6::Zero();  ///< w*: what it would do without the shells, the coming gravity included
-    double radius = 0.0;            ///< of a ball around `position` that holds the body [m]
+    Vec3 position = Vec3::Zero();    ///< centre of mass at the start of the step [m]
+    Mat6 mass = Mat6::Zero();        ///< blockdiag(m I, R I R^T), and the stiff terms of its supports
+    Vec6 freeTwist = Vec6::Zero();   ///< w*: what it would do without the shells, the coming gravity included
+    Vec6 startTwist = Vec6::Zero();  ///< as it is when the step begins: what contacts bounce from
+    double radius = 0.0;             ///< of a ball around `position` that holds the body [m]
     double inner = 1e300;  ///< of a ball that fits into its thinnest piece: contacts of faster motion are swept [m]
     std::vector<BodySupport> supports{};
     const void* key = nullptr;    ///< the same from step to step: whose contacts to remember
@@ -60,6 +61,7 @@ struct Contact {
     Vec3 point{0, 0, 0};            ///< on the body's surface [m]
     double gap = 0.0;               ///< signed distance minus contact thickness at the queried configuration [m]
     double friction = 0.0;          ///< Coulomb coefficient of the pair [-]
+    double restitution = 0.0;       ///< Newton's coefficient of the pair, 0 to 1 [-]
     double time = 0.0;              ///< of touch, where it was found by sweeping [s]
     bool isVertex() const { return weights.x() == 1.0; }
 };

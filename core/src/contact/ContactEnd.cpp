@@ -89,6 +89,7 @@ bool ContactResponse::closeFirst(int round) {
     place(touch, *first);
     touch.active = true;
     touch.target = -first->gap / m_input.h;  // as close as they were when they touched
+    if (touch.bounces) touch.target = std::max(touch.target, leavingSpeed(touch));
     return true;
 }
 
@@ -173,6 +174,7 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
         touch.allowedGap += lacks - take;
         touch.target = relativeVelocity(touch, solved).dot(contact.normal) - take / m_input.h;
     }
+    if (touch.bounces) touch.target = std::max(touch.target, leavingSpeed(touch));
     return true;
 }
 

@@ -108,6 +108,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     input.contacts->find({positions, still, 0.0}, reach, m_memory.empty() ? kNone : 10.0 * m_vertexSlop, m_found);
     const std::map<int, double> room = roomBesideFaces();
     for (const Contact& contact : m_found) addAtStart(contact, room, y);
+    if (isAnyBouncy()) m_care = kInFull;
     findFast();
     if (m_anyFast) {
         m_care = kInFull;
@@ -460,10 +461,11 @@ bool ContactResponse::update(const CoupledSystem& system, const IslandVelocities
     const bool released = releasePulling(round);
     // Where everything ends is worth looking at only when no contact pulls: before, velocities can be anything.
     const bool entered = !released && checkEnd(solved, y, round);
+    const bool bounced = !released && !entered && bounce(solved);
     // Friction follows the normal impulses only when these have settled: lagged behind a passing one it runs away.
-    const bool slid = !released && !entered && updateFriction(system);
-    if (released || entered) relaxDamping();
-    const bool changed = released || entered || slid;
+    const bool slid = !released && !entered && !bounced && updateFriction(system);
+    if (released || entered || bounced) relaxDamping();
+    const bool changed = released || entered || bounced || slid;
     if (changed && round + 2 == kMaxRounds) dropExcessFriction();
     return changed && round + 1 < kMaxRounds;
 }
@@ -544,7 +546,7 @@ void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
     m_memory.clear();
     m_memoryStep = m_input.h;
     for (const Touch& touch : m_touches) {
-        const bool pushes = touch.active && touch.normalImpulse > 0.0;
+        const bool pushes = touch.active && touch.normalImpulse > 0.0 && !touch.bounces;
         if (!touch.impulse.isZero(0.0))  // took part in the last solve
             impulses.push_back({touch.contact, touch.impulse, touch.sticks || creeps(touch), touch.slide});
         // Vertices that come and go in a sliding sheet are not without friction in the step in which they come back.

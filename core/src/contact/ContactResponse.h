@@ -83,6 +83,7 @@ class ContactResponse {
         bool active = false, sticks = false, isRow = false;
         double lambda = 0.0, kappa = 0.0;  ///< soft rows: multiplier [N s] and penalty [kg]
         bool isPinched = false;            ///< a soft row of vertices that another body holds
+        bool bounces = false;              ///< its target is that of restitution
         bool jammed = false;               ///< walls on both sides leave the vertex no room
         Slip slip;
         int flips = 0;        ///< between sticking and sliding, in this step
@@ -159,6 +160,9 @@ class ContactResponse {
     double vertexStiffness(const CoupledSystem& system, const Touch& touch) const;
     void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);
     bool releasePulling(int round);
+    double leavingSpeed(const Touch& touch) const;
+    bool isAnyBouncy() const;
+    bool bounce(const IslandVelocities& solved);
     void addFriction(const Touch& touch, Mat3& damping, Vec3& load) const;
     bool updateFriction(const CoupledSystem& system);
     bool updateFrictionQuickly(bool rough);

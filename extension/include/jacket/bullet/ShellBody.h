@@ -32,6 +32,7 @@ struct ShellOptions {
     double tolerance = 1e-3;             ///< of the linear solve, relative
     int maxIterations = 1000;            ///< of one linear solve
     double friction = 0.5;               ///< multiplied with the body's, as Bullet does [-]
+    double restitution = 0.0;            ///< 0 to 1, multiplied with the body's, as Bullet does [-]
     int collisionGroup = 1;              ///< btBroadphaseProxy::DefaultFilter
     int collisionMask = -1;              ///< btBroadphaseProxy::AllFilter
     double contactThickness = -1.0;      ///< distance kept from surfaces [m]; < 0: half the shell's thickness
