@@ -135,6 +135,7 @@ StepReport IslandSolver::solve(const IslandInput& input) {
     LapTimer closing(input);
     report.passed = s.response.passes({s.v, s.endTwists(), s.unfiltered}, s.y);
     closing.addTo(report.times.contact);
+    report.settled = !s.unsettled;
     report.mayPass = s.response.hasFastBody() && (report.limited || s.unsettled);
     s.store(input, report);  // velocities, twists, reactions
     return report;

@@ -193,6 +193,7 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     WorldReport report{.shells = size()};
     report.rejectedSteps = m_report.rejectedSteps;
     report.unconvergedSteps = m_report.unconvergedSteps;
+    report.unsettledSteps = m_report.unsettledSteps;
     report.passedSteps = m_report.passedSteps;
     m_report = report;
     m_impl->obstacles.beginStep();
@@ -309,8 +310,10 @@ void ShellWorld::accept(Island& island, const StepReport& report, const std::vec
     m_report.limited = m_report.limited || report.limited;
     m_report.contacts += static_cast<int>(report.contacts.size());
     m_report.converged = m_report.converged && report.converged;
+    m_report.settled = m_report.settled && report.settled;
     m_report.finite = m_report.finite && report.finite;
     m_report.unconvergedSteps += report.converged ? 0 : 1;
+    m_report.unsettledSteps += report.settled ? 0 : 1;
     m_report.rejectedSteps += report.finite ? 0 : 1;
     for (ShellBody* shell : island.shells) {
         shell->m_contacts.clear();

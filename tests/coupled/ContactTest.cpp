@@ -45,6 +45,26 @@ TEST(Contact, ABallAtRestStaysWhereItIsAndWeighsWhatItWeighs) {
     EXPECT_LT(worst, 5e-3 * weight);
 }
 
+/// A ball of a hundredth of a vertex' mass, in steps in which it falls through half of its height.
+TEST(Contact, SaysWhenContactsUseUpTheirRounds) {
+    Scene scene;
+    scene.addSphere(0.25, 0.01 * 0.3 * 4.0 / 400, btVector3(0, 1, 0));
+    pinBorder(scene.shells->add(squareSheet(2, 20), trampolineCloth()));
+    int unsettled = 0;
+    for (int i = 0; i < 20; ++i) {
+        scene.step(0.1);
+        unsettled += scene.shells->lastStep().settled ? 0 : 1;
+    }
+    EXPECT_GT(unsettled, 0);
+    EXPECT_EQ(scene.shells->lastStep().unsettledSteps, unsettled);
+
+    Scene calm;
+    calm.addSphere(0.25, 2.0, btVector3(0, btScalar(0.26), 0));
+    pinBorder(calm.shells->add(squareSheet(2, 12), trampolineCloth()));
+    calm.run(2.0, kStep);
+    EXPECT_EQ(calm.shells->lastStep().unsettledSteps, 0);
+}
+
 /// Bodies smaller than a triangle, or with corners that are, on a sheet of coarse cells.
 class SmallBody : public ::testing::TestWithParam<std::tuple<const char*, double>> {};
 

@@ -90,8 +90,7 @@ TEST_P(RollingBall, AcceleratesAsASolidSphereDoes) {
     EXPECT_NEAR(v, expected, 0.02 * expected);
     EXPECT_NEAR(-double(ball.getAngularVelocity().z()) * radius, v, 0.02 * v);
 }
-INSTANTIATE_TEST_SUITE_P(Sheets, RollingBall,
-                         ::testing::Combine(::testing::Values(5, 10, 20), ::testing::Bool()));
+INSTANTIATE_TEST_SUITE_P(Sheets, RollingBall, ::testing::Combine(::testing::Values(5, 10, 20), ::testing::Bool()));
 
 }  // namespace
 }  // namespace jacket::bullet::testing

@@ -30,6 +30,7 @@ struct StepReport {
     int solves = 0;         ///< linear solves: 1 without contacts, more while the active set changes
     double residual = 0.0;  ///< relative residual of the last solve, in the preconditioner's norm [-]
     bool converged = true;  ///< false: a solve hit its iteration budget, or a contact ends deeper than allowed
+    bool settled = true;    ///< false: contacts have used up their rounds, and may not agree with the motion
     bool finite = true;     ///< false: the step was rejected and the state is what it was before
     bool limited = false;   ///< Newton did not settle and the step would have gained energy: deformation was cut short
     bool passed = false;    ///< a fast body is through a shell at the end of the step

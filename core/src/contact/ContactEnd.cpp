@@ -244,7 +244,8 @@ void ContactResponse::pushOut(Points& v, std::vector<ContactImpulse>& impulses) 
         m_deepestGap = std::min(m_deepestGap, one.left);
         if (one.impulse == 0.0) continue;
         impulses.push_back({contact, one.impulse * contact.normal, false, Vec3::Zero()});
-        if (contact.isVertex()) m_memory[keyOf(contact)] = {one.impulse, 0.0, false, {}, contact.point, true, contact.vertices};
+        if (contact.isVertex())
+            m_memory[keyOf(contact)] = {one.impulse, 0.0, false, {}, contact.point, true, contact.vertices};
     }
     for (const auto& [vertex, by] : moved) v.col(vertex) += by / m_input.h;
 }

@@ -19,9 +19,11 @@ struct Island;
 struct WorldReport {
     int shells = 0, awake = 0, contacts = 0, pcgIterations = 0, solves = 0;
     bool converged = true;
+    bool settled = true;          ///< false: contacts of a shell have used up their rounds
     bool finite = true;           ///< false: a shell's step was rejected; it stood still
     int rejectedSteps = 0;        ///< since the world was made
     int unconvergedSteps = 0;     ///< since the world was made
+    int unsettledSteps = 0;       ///< since the world was made
     int passedSteps = 0;          ///< since the world was made: in which a fast body went through a shell, or may have
     bool limited = false;         ///< deformation was cut short, or a step would have gained energy
     StepTimes times{};            ///< of the solves, over all islands [s]
