@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "Convert.h"
+#include "ManifoldPoint.h"
 #include "ShellProxy.h"
 
 namespace jacket::bullet {
@@ -21,17 +22,9 @@ struct FeaturePoint {
     btManifoldPoint point;
 };
 
-FeaturePoint toManifoldPoint(const BodyContact& impulse) {
+FeaturePoint toFeaturePoint(const BodyContact& impulse) {
     const Contact& contact = impulse.contact;
-    const btVector3 onBody = toBullet(contact.point),
-                    onShell = toBullet(Vec3(contact.point + contact.gap * contact.normal));
-    btManifoldPoint point(onShell, impulse.object->getWorldTransform().inverse() * onBody, toBullet(contact.normal),
-                          btScalar(contact.gap));
-    point.m_positionWorldOnA = onShell;
-    point.m_positionWorldOnB = onBody;
-    point.m_partId0 = 0;
-    point.m_index0 = impulse.triangle;
-    point.m_combinedFriction = btScalar(contact.friction);
+    btManifoldPoint point = toManifoldPoint(contact, *impulse.object, impulse.triangle);
     const double along = impulse.impulse.dot(contact.normal);
     const Vec3 across = impulse.impulse - along * contact.normal;
     point.m_appliedImpulse = btScalar(along);
@@ -123,7 +116,7 @@ std::vector<ContactManifolds::Touch> ContactManifolds::collect(btCollisionWorld&
             auto touch =
                 std::find_if(touches.begin() + first, touches.end(), [&](const Touch& t) { return t.pair == pair; });
             if (touch == touches.end()) touch = touches.insert(touch, {pair, {}});
-            touch->points.push_back(toManifoldPoint(shell->contacts()[i]));
+            touch->points.push_back(toFeaturePoint(shell->contacts()[i]));
         }
     }
     for (Touch& touch : touches) {

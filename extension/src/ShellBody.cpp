@@ -7,6 +7,7 @@
 #include <string>
 
 #include "Convert.h"
+#include "ManifoldPoint.h"
 #include "ShellProxy.h"
 #include "Sleepers.h"
 
@@ -135,17 +136,11 @@ void ShellBody::fallAsleep() {
 }
 
 BodyContact ShellBody::describe(const ContactImpulse& impulse, btCollisionObject& object) const {
-    BodyContact result{impulse, &object};
-    const HalfEdgeMesh& mesh = m_shell.mesh();
-    const auto& vertices = impulse.contact.vertices;
-    if (impulse.contact.isVertex()) {
-        result.triangle = mesh.trianglesAround(vertices[0]).front();
-        for (int a = 0; a < 3; ++a) result.barycentric[a] = triangles()(a, result.triangle) == vertices[0] ? 1.0 : 0.0;
-        return result;
-    }
-    for (const int t : mesh.trianglesAround(vertices[0]))
-        if (Eigen::Map<const Eigen::Vector3i>(vertices.data()) == triangles().col(t)) result.triangle = t;
-    result.barycentric = impulse.contact.weights;
+    const Contact& contact = impulse.contact;
+    BodyContact result{impulse, &object, triangleOf(m_shell.mesh(), contact), contact.weights};
+    if (!contact.isVertex()) return result;
+    for (int a = 0; a < 3; ++a)
+        result.barycentric[a] = triangles()(a, result.triangle) == contact.vertices[0] ? 1.0 : 0.0;
     return result;
 }
 

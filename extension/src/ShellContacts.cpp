@@ -4,6 +4,8 @@
 #include <array>
 #include <limits>
 
+#include "ManifoldPoint.h"
+
 namespace jacket::bullet {
 namespace {
 
@@ -70,6 +72,7 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
         const Obstacle& obstacle = m_obstacles[body];
         m_byFeature.clear();
         m_candidates.clear();
+        const auto first = static_cast<std::ptrdiff_t>(contacts.size());
         Query query{pair,
                     shell,
                     body,
@@ -86,6 +89,7 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
         for (std::size_t k = 0; k < obstacle.shape->concave.size(); ++k)
             findConcave(query, obstacle.shape->concave[k], m_patches[pair][k]);
         addVertices(query);
+        std::for_each(contacts.begin() + first, contacts.end(), [&](Contact& contact) { setMaterial(contact); });
     }
 }
 
@@ -230,13 +234,22 @@ std::vector<int> ShellContacts::sidesOf(Sides& known, std::vector<SurfacePoint>&
     return sides;
 }
 
-/// What shell and body make of it together: the products, as Bullet combines them. A body that gives back more than it
-/// gets would do so without end.
-void ShellContacts::setMaterial(Contact& contact) const {
-    const ShellOptions& options = m_shells[contact.shell]->options();
+/// What shell and body make of it together: the products, as Bullet combines them, or what the user makes of these. A
+/// body that gives back more than it gets would do so without end.
+void ShellContacts::setMaterial(Contact& contact) {
+    const ShellBody& shell = *m_shells[contact.shell];
     const btCollisionObject& body = *m_obstacles[contact.body].object;
-    contact.friction = options.friction * double(body.getFriction());
-    contact.restitution = std::clamp(options.restitution * double(body.getRestitution()), 0.0, 1.0);
+    contact.friction = shell.options().friction * double(body.getFriction());
+    contact.restitution = std::clamp(shell.options().restitution * double(body.getRestitution()), 0.0, 1.0);
+    if (!isMaterialCustom(shell.collisionObject(), body)) return;
+    const auto [known, fresh] = m_materials.try_emplace({contact.shell, contact.body, contact.feature});
+    Material& material = known->second;
+    if (fresh) {
+        customiseMaterial(contact, shell.shell().mesh(), shell.collisionObject(), body);
+        material = {contact.friction, contact.restitution};
+    }
+    contact.friction = material.friction;
+    contact.restitution = material.restitution;
 }
 
 void ShellContacts::add(Query& query, int feature, const SurfacePoint& surface, const std::array<int, 3>& vertices,
@@ -250,7 +263,6 @@ void ShellContacts::add(Query& query, int feature, const SurfacePoint& surface, 
     contact.normal = query.frame.linear() * surface.normal;
     contact.point = query.frame * surface.point;
     contact.gap = surface.distance - query.thickness();
-    setMaterial(contact);
     const auto [known, fresh] = m_byFeature.try_emplace(feature, query.contacts.size());
     if (fresh)
         query.contacts.push_back(contact);

@@ -1,6 +1,7 @@
 #pragma once
 #include <map>
 #include <memory>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -33,13 +34,18 @@ class ShellContacts final : public ContactDetector {
     void findConcave(Query& query, const ConcavePiece& piece, std::unique_ptr<TrianglePatch>& patch);
     void addFace(Query& query, int triangle, const TrianglePoint& touch);
     void addVertices(Query& query);
-    void setMaterial(Contact& contact) const;
+    void setMaterial(Contact& contact);
     using Sides = std::vector<SurfacePoint>;
     static std::vector<int> sidesOf(Sides& known, std::vector<SurfacePoint>& surfaces);
 
     std::vector<const ShellBody*> m_shells;
     const std::vector<Obstacle>& m_obstacles;
     std::vector<std::pair<int, int>> m_pairs;
+    /// What the user made of a contact when it was first found in this step.
+    struct Material {
+        double friction, restitution;
+    };
+    std::map<std::tuple<int, int, int>, Material> m_materials;  ///< of shell, body and feature
     std::vector<unsigned char> m_outside;    ///< per vertex: which sides of the obstacle's box it lies beyond
     std::map<int, std::size_t> m_byFeature;  ///< of the present pair: index in the result
 

@@ -90,6 +90,7 @@ std::optional<Contact> ShellContacts::Sweep::advance(const std::array<int, 3>& c
 }
 
 void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& contacts) {
+    const auto first = static_cast<std::ptrdiff_t>(contacts.size());
     for (const auto& [shell, body] : m_pairs) {
         if (!motion.fast[body]) continue;
         const Obstacle& obstacle = m_obstacles[body];
@@ -108,7 +109,6 @@ void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& cont
                 if (!contact) continue;
                 contact->shell = shell;
                 contact->body = body;
-                setMaterial(*contact);
                 contact->feature = Feature::triangle(t, mesh.vertexCount(), edgeCount);
                 int corner = 0;
                 if (contact->weights.maxCoeff(&corner) > kAtVertex) {
@@ -124,6 +124,7 @@ void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& cont
             }
         }
     }
+    std::for_each(contacts.begin() + first, contacts.end(), [&](Contact& contact) { setMaterial(contact); });
 }
 
 }  // namespace jacket::bullet

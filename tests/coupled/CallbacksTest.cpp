@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <set>
 
 #include "support/BulletScene.h"
 
@@ -19,12 +20,20 @@ using jacket::testing::totalMomentum;
 
 /// Bullet's callbacks are global functions: this hands them to whoever is listening.
 struct Listener {
-    int started = 0, processed = 0, ended = 0, destroyed = 0;
+    int added = 0, started = 0, processed = 0, ended = 0, destroyed = 0;
     std::function<void(btPersistentManifold&)> onStart, onEnd;
     std::function<void(btManifoldPoint&, btCollisionObject&, btCollisionObject&)> onPoint;
+    std::function<void(btManifoldPoint&, const btCollisionObject&, int, const btCollisionObject&)> onAdded;
 
     Listener() {
         s_current = this;
+        gContactAddedCallback = [](btManifoldPoint& point, const btCollisionObjectWrapper* first, int, int index,
+                                   const btCollisionObjectWrapper* second, int, int) {
+            ++s_current->added;
+            if (s_current->onAdded)
+                s_current->onAdded(point, *first->getCollisionObject(), index, *second->getCollisionObject());
+            return true;
+        };
         gContactStartedCallback = [](btPersistentManifold* const& m) {
             ++s_current->started;
             if (s_current->onStart) s_current->onStart(*m);
@@ -46,6 +55,7 @@ struct Listener {
         };
     }
     ~Listener() {
+        gContactAddedCallback = nullptr;
         gContactStartedCallback = nullptr;
         gContactEndedCallback = nullptr;
         gContactProcessedCallback = nullptr;
@@ -291,6 +301,125 @@ TEST(Callbacks, ContactsOfASleepingShellStayAndAreNotProcessed) {
     sheet.setVelocity(btVector3(0, 2, 0));
     scene.run(0.2, 1.0 / 60);
     EXPECT_EQ(listener.ended, 1);
+}
+
+void wantAddedCallback(btCollisionObject& object) {
+    object.setCollisionFlags(object.getCollisionFlags() | btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
+}
+
+/// A sheet that slides over a floor.
+struct Slide : Scene<> {
+    btRigidBody& floor = addFloor();
+    ShellBody& sheet;
+    Slide() : sheet(shells->add(lying(), trampolineCloth(), {.restitution = 0.5})) {
+        sheet.setVelocity(btVector3(2, 0, 0));
+    }
+    static TriangleMesh lying() {
+        TriangleMesh mesh = squareSheet(0.4, 4);
+        mesh.positions.row(1).array() += 0.5 * trampolineCloth().thickness + 1e-5;
+        return mesh;
+    }
+    double speed() const { return sheet.shell().velocities().row(0).mean(); }
+};
+
+TEST(AddedCallback, IsHeardWhereShellOrBodyWantIt) {
+    for (const char* who : {"nobody", "shell", "floor"}) {
+        Listener listener;
+        Slide scene;
+        if (*who == 's') wantAddedCallback(scene.sheet.collisionObject());
+        if (*who == 'f') wantAddedCallback(scene.floor);
+        std::set<int> triangles;
+        listener.onAdded = [&](btManifoldPoint& point, const btCollisionObject& first, int index,
+                               const btCollisionObject& second) {
+            EXPECT_EQ(scene.shells->find(first), &scene.sheet);
+            EXPECT_EQ(&second, &scene.floor);
+            EXPECT_EQ(index, point.m_index0);
+            EXPECT_NEAR(point.m_combinedFriction, 0.25, 1e-6);
+            EXPECT_EQ(point.m_combinedRestitution, 0);
+            EXPECT_NEAR(point.m_normalWorldOnB.y(), 1, 1e-6);
+            triangles.insert(index);
+        };
+        scene.step(1.0 / 120);
+        listener.added = 0;
+        scene.step(1.0 / 120);
+        if (*who == 'n') {
+            EXPECT_EQ(listener.added, 0);
+            continue;
+        }
+        EXPECT_GE(listener.added, scene.sheet.vertexCount());  // of what touches, once each
+        const HalfEdgeMesh& mesh = scene.sheet.shell().mesh();
+        EXPECT_LE(listener.added, mesh.vertexCount() + int(mesh.edges().size()) + mesh.triangleCount());
+        EXPECT_GE(*triangles.begin(), 0);
+        EXPECT_GT(triangles.size(), 8u);
+    }
+}
+
+TEST(AddedCallback, WhatItLeavesAloneKeepsItsBits) {
+    const auto run = [](bool isHeard) {
+        Listener listener;
+        Slide scene;
+        if (isHeard) wantAddedCallback(scene.floor);
+        scene.run(0.3, 1.0 / 120);
+        EXPECT_EQ(listener.added > 0, isHeard);
+        return stateOf(scene);
+    };
+    EXPECT_EQ(run(true), run(false));
+}
+
+/// Already in the step of the first touch.
+TEST(AddedCallback, ItsFrictionCounts) {
+    const auto speedWith = [](btScalar friction) {
+        Listener listener;
+        Slide scene;
+        wantAddedCallback(scene.floor);
+        listener.onAdded = [&](btManifoldPoint& point, auto&, int, auto&) { point.m_combinedFriction = friction; };
+        scene.run(0.2, 1.0 / 120);
+        const btPersistentManifold& manifold = *scene.dispatcher.getManifoldByIndexInternal(0);
+        EXPECT_EQ(manifold.getContactPoint(0).m_combinedFriction, friction);
+        return scene.speed();
+    };
+    EXPECT_NEAR(speedWith(0), 2.0, 1e-3);
+    EXPECT_NEAR(speedWith(btScalar(0.5)), 2.0 - 0.5 * 9.81 * 0.2, 0.06);
+}
+
+/// Ice under one half of a sheet: it turns.
+TEST(AddedCallback, SpeaksOfEveryPoint) {
+    Listener listener;
+    Slide scene;
+    wantAddedCallback(scene.floor);
+    listener.onAdded = [&](btManifoldPoint& point, auto&, int, auto&) {
+        if (point.m_positionWorldOnB.z() > 0) point.m_combinedFriction = 0;
+    };
+    scene.run(0.15, 1.0 / 120);
+    const Points v = scene.sheet.shell().velocities(), x = scene.sheet.shell().positions();
+    int least = 0, most = 0;
+    x.row(2).minCoeff(&least);
+    x.row(2).maxCoeff(&most);
+    EXPECT_GT(v(0, most), v(0, least) + 0.1);
+}
+
+/// The first hit is the one that matters.
+TEST(AddedCallback, ItsRestitutionCounts) {
+    Listener listener;
+    listener.onAdded = [](btManifoldPoint& point, auto&, int, auto&) { point.m_combinedRestitution = 7; };
+    Scene scene;
+    wantAddedCallback(scene.addFloor());
+    TriangleMesh mesh = squareSheet(0.2, 4);
+    mesh.positions.row(1).array() += 0.3;
+    const auto& plate = scene.shells->add(mesh, materials::steel(2e-3));
+    while (plate.contacts().empty()) scene.step(1.0 / 240);
+    scene.run(0.24, 1.0 / 240);
+    EXPECT_NEAR(plate.shell().positions().row(1).mean(), 0.3, 0.01);
+}
+
+TEST(AddedCallback, GivesBackTheUsersData) {
+    Listener listener;
+    Slide scene;
+    wantAddedCallback(scene.floor);
+    listener.onAdded = [&](btManifoldPoint& point, auto&, int, auto&) { point.m_userPersistentData = &listener; };
+    scene.run(0.1, 1.0 / 120);
+    EXPECT_GT(listener.added, 0);
+    EXPECT_EQ(listener.destroyed, listener.added);
 }
 
 /// Bullet wakes what a moving contact touches; a shell's manifold is none.

@@ -39,6 +39,12 @@ struct WorldReport {
 /// triangle in m_index0: up to four per body, the strongest, with the impulse of the last substep. gContactStarted-,
 /// -Processed- and -EndedCallback hear of them, and may remove any shell or body, except (as everywhere in Bullet) in
 /// an end that a removal causes. Bullet's solvers never respond to them.
+///
+/// gContactAddedCallback is called, as Bullet does it, where the shell's collision object or the body has
+/// CF_CUSTOM_MATERIAL_CALLBACK: once a substep for every vertex, edge or triangle of the shell that comes near, before
+/// the solve, which takes the m_combinedFriction and m_combinedRestitution (at most 1) that it leaves. Body 0 is the
+/// shell, m_index0 its triangle, index 1 is -1. The point is in no manifold: other changes to it have no effect, and
+/// m_userPersistentData goes to gContactDestroyedCallback at once. It may not add or remove anything.
 class ShellWorld : public btActionInterface {
   public:
     /// Throws std::invalid_argument for a btSimpleDynamicsWorld, which runs no actions.
