@@ -1,6 +1,7 @@
 // Scenes whose outcome a rounding can decide, from many starts that differ by less than a micrometre: how often they
-// end well, and how badly otherwise.
+// end well, and how badly otherwise. And how still a ball rests that may roll.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
@@ -77,6 +78,30 @@ void lightBall(double ratio, int starts) {
                 int(thrown), starts, gains.back());
 }
 
+/// A ball of 2 kg on a trampoline of `cells` x `cells`, in steps of 1/60 s, after 10 s that it has to come to rest.
+void ballAtRest(int cells, int steps) {
+    constexpr double h = 1.0 / 60, weight = 2.0 * 9.81;
+    BulletScene scene;
+    auto& ball = scene.addSphere(0.25, 2.0, btVector3(0, btScalar(0.26), 0));
+    ball.setActivationState(DISABLE_DEACTIVATION);
+    ShellMaterial cloth = trampolineCloth();
+    cloth.massDamping = 5.0;
+    auto& sheet = scene.shells->add(squareSheet(2, cells), cloth, {.sleeping = false});
+    pinBorder(sheet);
+    scene.run(10.0, h);
+    const Vec3 start = toVec3(ball.getWorldTransform().getOrigin());
+    double moved = 0.0, sum = 0.0, worst = 0.0;
+    for (int i = 0; i < steps; ++i) {
+        scene.step(h);
+        const double force = jacket::testing::contactImpulse(sheet, ball).y() / h;
+        sum += force;
+        worst = std::max(worst, std::abs(force / weight - 1.0));
+        moved = std::max(moved, (toVec3(ball.getWorldTransform().getOrigin()) - start).norm());
+    }
+    std::printf("ball at rest on %2d cells, %d steps: moved %.3g mm; force off by %.2g at most, %.1g on average\n",
+                cells, steps, 1e3 * moved, worst, std::abs(sum / steps / weight - 1.0));
+}
+
 void runAll(int starts) {
     clearance("cloth on a hill", starts, [](double x) { return HillScene(x).lowest(); });
     for (const double angle : {60.0, 90.0, 120.0})
@@ -85,6 +110,7 @@ void runAll(int starts) {
     for (const int count : {2, 3})
         for (const double h : {1.0 / 60, 1.0 / 240}) stack(count, h, starts);
     for (const double ratio : {1e-3, 1e-2, 1.0}) lightBall(ratio, starts);
+    for (const int cells : {11, 12, 16, 24}) ballAtRest(cells, 500 * starts);
 }
 
 }  // namespace
