@@ -22,6 +22,8 @@ constexpr double kMostGainOfFast = 0.1;    ///< the same where a body goes farth
 constexpr double kMostOvertaking = 3.0;    ///< of a shell that is pushed: its speed over the pushing body's
 constexpr double kMostEnergyGain = 1.0;    ///< of a step that is accepted as it is
 
+constexpr int kMostFactored = 600;  ///< vertices of a shell that is factored completely
+
 constexpr int kLeastForTeam = 1000;  ///< vertices of an island from which on threads pay
 
 /// Gives the time since the last call, by the caller's clock if there is one.
@@ -46,6 +48,12 @@ Vec3 contactArm(const IslandInput& input, const Contact& contact) {
     for (int a = 0; a < 3; ++a)
         arm += contact.weights[a] * input.shells[contact.shell]->positions().col(contact.vertices[a]);
     return arm;
+}
+
+/// Whether a shell is factored completely: incomplete factors know little of bending that spreads over several edges.
+bool isToBeFactored(const Shell& shell, double h) {
+    return shell.vertexCount() <= kMostFactored && shell.isStiff(h) &&
+           shell.settings().preconditioner == Preconditioner::IncompleteCholesky;
 }
 
 /// By how much damping makes a mass harder to move.
@@ -83,7 +91,7 @@ struct IslandSolver::Impl {
     void beginTwoStep(const IslandInput& input, std::size_t shell);
     void assemble(const IslandInput& input, bool atEnd);
     void readFreeTwists();
-    bool overstretches(const IslandInput& input) const;
+    bool overstretches(const IslandInput& input, bool isSuspect) const;
     double elasticEnergyAfter(const IslandInput& input, std::size_t shell, const Points& velocities) const;
     double energyGain(const IslandInput& input) const;
     bool bodiesLead(const IslandInput& input) const;
@@ -202,7 +210,7 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
         const Points before = newton == 1 ? Points() : v;  // most steps are over after the first
         solveRounds(input, report);
         if (!unfiltered.allFinite()) return;
-        const bool goOn = toTheEnd ? newton == 1 || improves(input, before) : overstretches(input);
+        const bool goOn = toTheEnd ? newton == 1 || improves(input, before) : overstretches(input, newton > 1);
         if (!goOn) return;
         if (const double gain = energyGain(input); gain < leastGain) {
             leastGain = gain;
@@ -268,19 +276,18 @@ double IslandSolver::Impl::elasticEnergyAfter(const IslandInput& input, std::siz
 
 /// Whether the solved step must be linearised again: it stretches an edge by far, or it gains energy. Backward Euler
 /// itself gains none; its one linear solve does where stiff shells turn far in a step. That is looked for only where
-/// edges change their lengths at all.
-bool IslandSolver::Impl::overstretches(const IslandInput& input) const {
+/// edges change their lengths at all, or where the step is suspect already.
+bool IslandSolver::Impl::overstretches(const IslandInput& input, bool isSuspect) const {
     constexpr double kMost = 0.1, kSuspect = 1e-3;  // change of an edge in one step, in rest lengths
-    bool suspect = false;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         const auto edges = shell.mesh().edges();
         const EdgeStretch stretch = edgeStretch(edges.data(), static_cast<int>(edges.size()), shell.m_restLength.data(),
                                                 shell.positions().data(), v.data() + 3 * offsets[k], stepOf[k]);
         if (stretch.lengthening > kMost) return true;
-        suspect = suspect || stretch.change > kSuspect;
+        isSuspect = isSuspect || stretch.change > kSuspect;
     }
-    return suspect && energyGain(input) > (dynamicBodies.empty() ? kEnergyGainAlone : kEnergyGain);
+    return isSuspect && energyGain(input) > (dynamicBodies.empty() ? kEnergyGainAlone : kEnergyGain);
 }
 
 /// Where Newton's method does not settle, as in a stiff shell pinched between bodies, the step would throw the shell
@@ -462,10 +469,13 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
         const StepSystem& step = input.shells[k]->m_assembly->assemble(
             *input.shells[k], stepOf[k], input.gravity, input.wind, from.middleCols(offsets[k], n),
             y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr, team);
-        parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions()});
+        parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions(),
+                         isToBeFactored(*input.shells[k], stepOf[k])});
     }
+    const bool isAnyStiff = std::any_of(parts.begin(), parts.end(), [](const auto& part) { return part.isStiff; });
     // Bodies that rest on the solution feel what single precision leaves over: soft rows and stacks lose their balance.
-    const bool isSingle = dynamicBodies.empty() && linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance &&
+    const bool isSingle = dynamicBodies.empty() && !isAnyStiff &&
+                          linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance &&
                           input.shells[0]->settings().preconditioner == Preconditioner::IncompleteCholesky;
     system.begin(std::move(parts), static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(),
                  supports.couplings(), isSingle ? Precision::Single : Precision::Double, isSingle ? team : nullptr);
@@ -497,8 +507,9 @@ double IslandSolver::Impl::floorOfReference(const IslandInput& input, double sha
 /// Until the contacts agree with the motion that they lead to. Where that is asked only once, and they changed in the
 /// last step, a rough solve tells enough.
 void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& report) {
-    constexpr double kRough = 0.03;  // tolerance of a rough solve
-    constexpr double kShare = 0.1;   // which leaves at most this of the residual that it starts with
+    constexpr double kCompleteTolerance = 1e-6;  // of what a solve starts with, where it takes a few iterations
+    constexpr double kRough = 0.03;              // tolerance of a rough solve
+    constexpr double kShare = 0.1;               // which leaves at most this of the residual that it starts with
     const ShellSettings& settings = input.shells[0]->settings();
     const double tolerance = linearTolerance(input);
     int maxIterations = settings.maxIterations;
@@ -513,8 +524,8 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         LapTimer lap(input);
         response.writeTo(system);
         lap.addTo(times.contact);
-        const bool isNew =
-            freshIterations < 0 || system.precision() == Precision::Single || lastIterations > 20 + 2 * freshIterations;
+        const bool isNew = freshIterations < 0 || preconditioner.isComplete() ||
+                           system.precision() == Precision::Single || lastIterations > 20 + 2 * freshIterations;
         if (isNew)
             preconditioner.build(system, settings.preconditioner);
         else
@@ -526,6 +537,7 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         system.start(guess, guessTwist, u);
         const double rho = pcg.begin(system, preconditioner, u);
         double target2 = tolerance * tolerance * norm2;
+        if (preconditioner.isComplete()) target2 = std::min(target2, kCompleteTolerance * kCompleteTolerance * rho);
         if (roughly) target2 = std::max(target2, std::min(kRough * kRough * norm2, kShare * kShare * rho));
         const PcgReport solve = pcg.finish(system, preconditioner, target2, 1.0, maxIterations, u);
         lastIterations = solve.iterations;
@@ -540,7 +552,9 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         lap.addTo(times.solve);
         const bool changed = response.update(system, {v, u.w, unfiltered}, y, round, roughly);
         lap.addTo(times.contact);
-        const bool lifted = supports.update(u.w, input.h * input.gravity.norm());
+        // What stiff shells do while their contacts are not settled would tip a body off what bears it.
+        const bool isTelling = !preconditioner.isComplete() || (!changed && !response.isLast(round));
+        const bool lifted = isTelling && supports.update(u.w, input.h * input.gravity.norm());
         if (lifted) {
             system.setBodies(supports.masses(), supports.freeTwists(), supports.couplings());
             readFreeTwists();
@@ -552,7 +566,7 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         guessTwist = u.w;
     }
     lastRounds = round + 1;
-    unsettled |= lastRounds >= ContactResponse::kMaxRounds;
+    unsettled |= !response.isQuick() && response.isLast(round);
 }
 
 void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {

@@ -112,6 +112,15 @@ void Shell::setVelocities(const Points& v) {
     m_lastH = 0.0;
 }
 
+double Shell::bendingLength(double h) const {
+    return std::pow(h * h * material().bendingStiffness() / material().areaDensity(), 0.25);
+}
+
+bool Shell::isStiff(double h) const {
+    constexpr double kEdges = 2.0;
+    return bendingLength(h) > kEdges * m_meanEdge;
+}
+
 void Shell::displace(int vertex, const Vec3& by) {
     m_x.col(vertex) += by;
     m_lastH = 0.0;

@@ -573,6 +573,23 @@ TEST(FilteredPcgTest, BodiesRowsAndFrictionEqualDense) {
     }
 }
 
+/// Bodies, rows and friction are eliminated exactly; a shell beside that is not costs iterations.
+TEST(FilteredPcgTest, CompleteFactorsNeedOneIteration) {
+    for (const bool all : {true, false}) {
+        Island island(14, {13, 8}, 3);
+        island.couple({{0, 2}});
+        std::vector<CoupledSystem::ShellPart> parts(island.system.shells().begin(), island.system.shells().end());
+        parts[0].isStiff = true;
+        parts[1].isStiff = all;
+        island.system.begin(parts, 21, island.system.mass(), island.system.freeTwist(),
+                            {island.system.couplings().begin(), island.system.couplings().end()});
+        makeBusy(island, 3.0);
+        const Solved solved = solve(island.system, Preconditioner::IncompleteCholesky, 1e-9);
+        EXPECT_LT(test::relativeError(solved.x(), DenseIsland(island.system).solve()), 1e-8);
+        EXPECT_LE(solved.report.iterations, all ? 1 : 40);
+    }
+}
+
 TEST(FilteredPcgTest, LightAndHeavyBodiesEqualDense) {
     for (const double ratio : {1e-3, 1e3}) {
         Island island(15, {16}, 1);

@@ -93,9 +93,11 @@ class Shell {
     const ShellSettings& settings() const { return m_settings; }
     int vertexCount() const { return static_cast<int>(m_x.cols()); }
     const Points& restPositions() const { return m_rest; }
-    const Points& positions() const { return m_x; }           ///< [m]
-    const Points& velocities() const { return m_v; }          ///< [m/s]: what the next `advance` moves with
-    double meanEdge() const { return m_meanEdge; }            ///< of the lengths of the edges at rest [m]
+    const Points& positions() const { return m_x; }   ///< [m]
+    const Points& velocities() const { return m_v; }  ///< [m/s]: what the next `advance` moves with
+    double meanEdge() const { return m_meanEdge; }    ///< of the lengths of the edges at rest [m]
+    double bendingLength(double h) const;             ///< over which bending spreads in a step: (h^2 D/rho t)^1/4 [m]
+    bool isStiff(double h) const;                     ///< whether that is several edges: vertices move together
     const Eigen::VectorXd& masses() const { return m_mass; }  ///< lumped, [kg]
 
     /// Place and motion; sizes must match (throws std::invalid_argument), values must be finite.

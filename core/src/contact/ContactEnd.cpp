@@ -60,7 +60,7 @@ bool ContactResponse::checkEnd(const IslandVelocities& solved, const Points& y, 
     findAtEnd(solved, y);
     bool changed = closeFound(solved, round);
     if (m_anyFast) changed |= closeFirst(round);
-    return changed && round + 1 < kMaxRounds;
+    return changed && !isLast(round);
 }
 
 bool ContactResponse::closeFound(const IslandVelocities& solved, int round) {
@@ -129,6 +129,7 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     const int known = touchOf(contact);
     const bool fresh = known < 0;
     const bool held = !fresh && m_touches[known].active;
+    if (held && m_touches[known].jammed) return false;
     const double slop = contact.isVertex() ? m_vertexSlop : m_faceSlop;
     const double lacks = missing(contact, known);
     if (lacks > -slop) return false;
@@ -153,17 +154,18 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
         if (touch.changes >= kMostChanges) return false;
         touch.active = true;
         ++touch.changes;
+        if (contact.isVertex()) putDown(contact);
     }
     if (held && round >= kFreezeRound) {
         touch.target -= 0.7 * lacks / m_input.h;
         return true;
     }
-    const bool turned =
-        !fresh && contact.normal.dot(touch.contact.normal) < 0.0;  // it has passed the middle of the body
+    const bool turned = !fresh && !entersThere(contact, touch, solved);
     touch.startGap = std::numeric_limits<double>::quiet_NaN();
     const Vec3 firstNormal = touch.contact.normal;
     const double firstGap = touch.contact.gap;
     place(touch, contact);
+    touch.missed = 0.0;
     if (touch.dynamicBody >= 0) touch.arm = armAtEnd(contact);
     if (turned) {
         touch.contact.normal = firstNormal;
@@ -176,6 +178,27 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     }
     if (touch.bounces) touch.target = std::max(touch.target, leavingSpeed(touch));
     return true;
+}
+
+/// What is lifted into a wall on the other side of the shell comes down again, and is not lifted any more.
+void ContactResponse::putDown(const Contact& contact) {
+    const int filter = m_filterOf[globalVertex(contact, 0)];
+    for (int k = 0; filter >= 0 && k < m_filters[filter].count; ++k) {
+        Touch& touch = m_touches[m_filters[filter].touches[k]];
+        if (!isFacing(touch.contact, contact)) continue;
+        touch.pressed = true;
+        touch.target -= touch.offset / m_input.h;
+        touch.offset = 0.0;
+    }
+}
+
+/// Whether a contact has come into the body where it is nearest to the surface at the end. What has gone deep may be
+/// nearer to another side: beyond the middle of the body, or beside its edge.
+bool ContactResponse::entersThere(const Contact& contact, const Touch& touch, const IslandVelocities& solved) const {
+    const double along = contact.normal.dot(touch.contact.normal);
+    if (along < 0.0) return false;
+    const double before = contact.gap - m_input.h * relativeVelocity(touch, solved).dot(contact.normal);
+    return along > 0.7 || !contact.isVertex() || before > -10.0 * m_vertexSlop;
 }
 
 /// Vertices that lie on a curved surface, or close above it, leave their chords inside it. They are lifted by as much,
@@ -198,7 +221,7 @@ bool ContactResponse::liftVertices(const Contact& contact, double by, const Isla
         const auto known = m_index.find(keyOf(vertex));
         if (known == m_index.end()) continue;
         Touch& touch = m_touches[known->second];
-        if (touch.contact.normal.dot(contact.normal) < 0.7) continue;
+        if (touch.contact.normal.dot(contact.normal) < 0.7 || touch.pressed) continue;
         if (!touch.active && !isQuick()) continue;
         const double off = touch.active ? touch.offset : endGap(touch, solved);
         if (!(off + by <= most) || (!touch.active && touch.changes >= kMostChanges)) continue;

@@ -40,7 +40,7 @@ bool ContactResponse::updateFriction(const CoupledSystem& system) {
     bool isWorthIt = false;
     for (Touch& touch : m_touches) {
         const double limit = touch.contact.friction * touch.normalImpulse;
-        if (!touch.active || limit <= 0.0) continue;
+        if (!touch.active || touch.jammed || limit <= 0.0) continue;
         const double matters = kFrictionChange * std::max(limit, kMinor * most);
         const double change = touch.sticks ? updateSticking(touch, matters, vertexStiffness(system, touch))
                                            : updateSliding(touch, matters, vertexStiffness(system, touch));
@@ -58,7 +58,7 @@ bool ContactResponse::updateFrictionQuickly(bool rough) {
     double sum = 0.0, fresh = 0.0, excess = 0.0;
     for (Touch& touch : m_touches) {
         const double limit = touch.contact.friction * touch.normalImpulse;
-        if (!touch.active || limit <= 0.0) continue;
+        if (!touch.active || touch.jammed || limit <= 0.0) continue;
         sum += limit;
         if (!touch.slip.known) fresh += limit;
         excess += std::max(0.0, (touch.impulse - touch.normalImpulse * touch.contact.normal).norm() - limit);

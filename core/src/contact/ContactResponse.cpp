@@ -94,6 +94,8 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     if (!input.contacts) return;
 
     m_care = isAmongWalls() && !isAnyStiff() ? kAmongWalls : kInFull;
+    if (std::any_of(input.shells.begin(), input.shells.end(), [&](const Shell* s) { return s->isStiff(input.h); }))
+        m_care = kStiff;
     m_creep = creepSpeed();
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);
     m_faceSlop = std::min(2e-4, 1e-2 * shortest);
@@ -108,12 +110,9 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     input.contacts->find({positions, still, 0.0}, reach, m_memory.empty() ? kNone : 10.0 * m_vertexSlop, m_found);
     const std::map<int, double> room = roomBesideFaces();
     for (const Contact& contact : m_found) addAtStart(contact, room, y);
-    if (isAnyBouncy()) m_care = kInFull;
     findFast();
-    if (m_anyFast) {
-        m_care = kInFull;
-        sweepAtStart();
-    }
+    if (isQuick() && (isAnyBouncy() || m_anyFast)) m_care = kInFull;
+    if (m_anyFast) sweepAtStart();
     keepEarliest();
 }
 
@@ -130,14 +129,11 @@ double ContactResponse::side(std::size_t shell) const {
 }
 
 /// Whether a shell passes on what one of its corners feels to all of it within a few steps: it does not give way to
-/// being pushed out, but is thrown by it. Bending spreads over a length of (h^2 D / rho t)^1/4 in a step.
+/// being pushed out, but is thrown by it.
 bool ContactResponse::isAnyStiff() const {
     constexpr double kLengths = 16.0;
     for (std::size_t k = 0; k < m_edge.size(); ++k) {
-        const ShellMaterial& material = m_input.shells[k]->material();
-        const double length =
-            std::pow(m_input.h * m_input.h * material.bendingStiffness() / material.areaDensity(), 0.25);
-        if (side(k) < kLengths * length) return true;
+        if (side(k) < kLengths * m_input.shells[k]->bendingLength(m_input.h)) return true;
     }
     return false;
 }
@@ -316,6 +312,7 @@ void ContactResponse::writeTo(CoupledSystem& system) {
         Touch& touch = m_touches[i];
         touch.isRow = touch.active && !joinFilter(static_cast<int>(i), constraints);
     }
+    findJams();
     for (Touch& touch : m_touches)  // after them, as what holds their vertices matters
         if (touch.isRow) rows.push_back(makeRow(touch, system));
     for (auto& filter : m_filters) finishFilter(filter, constraints[filter.constraint], rows);
@@ -348,25 +345,49 @@ bool ContactResponse::joinFilter(int index, std::vector<VertexConstraint>& const
     return true;
 }
 
-/// Whether the walls on both sides of a vertex leave it no room; `target`: half way between what they want then.
-bool ContactResponse::isPinched(const VertexFilter& filter, double& target) const {
-    if (filter.opposite < 0) return false;
-    const Touch &first = m_touches[filter.touches[0]], &other = m_touches[filter.opposite];
-    const Vec3& n = first.contact.normal;
-    const double most = -other.target + n.dot(other.carried - first.carried);
-    if (first.target <= most) return false;
-    target = 0.5 * (first.target + most);
-    return true;
+/// Whether a wall that faces this contact's leaves it no room. Half way between them is what it is to do then: made
+/// exact, the two would push against each other with forces without bound.
+void ContactResponse::jam(Touch& touch, const Touch& other) const {
+    const Vec3& n = touch.contact.normal;
+    if (touch.dynamicBody >= 0 || other.dynamicBody >= 0 || !isFacing(touch.contact, other.contact)) return;
+    const double most = -other.target + n.dot(other.carried - touch.carried);
+    if (touch.target <= most) return;
+    const double between = 0.5 * (touch.target + most);
+    touch.between = touch.jammed ? std::min(touch.between, between) : between;
+    touch.jammed = true;
+}
+
+/// Soft rows that share vertices with contacts, or are close to rows, from the other side.
+void ContactResponse::findJams() {
+    constexpr double kClose = 0.6;  // of an edge
+    std::vector<Touch*> rows;
+    for (Touch& touch : m_touches) {
+        touch.jammed = false;
+        if (touch.isRow && touch.dynamicBody < 0) rows.push_back(&touch);
+    }
+    for (Touch* row : rows) {
+        const Contact& c = row->contact;
+        for (int a = 0; a < 3; ++a) {
+            const int filter = m_filterOf[globalVertex(c, a)];
+            if (c.weights[a] < 1.0 - kClose || filter < 0) continue;
+            for (int k = 0; k < m_filters[filter].count; ++k) jam(*row, m_touches[m_filters[filter].touches[k]]);
+            if (m_filters[filter].opposite >= 0) jam(*row, m_touches[m_filters[filter].opposite]);
+        }
+        for (const Touch* other : rows)
+            if (other->contact.shell == c.shell && (other->contact.point - c.point).norm() < kClose * m_edge[c.shell])
+                jam(*row, *other);
+    }
 }
 
 void ContactResponse::finishFilter(VertexFilter& filter, VertexConstraint& constraint, std::vector<SoftRow>& rows) {
     Touch& first = m_touches[filter.touches[0]];
-    double between = 0.0;
-    first.jammed = isPinched(filter, between);
-    if (filter.opposite >= 0) m_touches[filter.opposite].jammed = first.jammed;
+    if (filter.opposite >= 0) {
+        jam(first, m_touches[filter.opposite]);
+        m_touches[filter.opposite].jammed = first.jammed;
+    }
     if (first.jammed) {  // held fast, with whatever force that takes
         constraint.free.setZero();
-        constraint.z = between * first.contact.normal;
+        constraint.z = first.between * first.contact.normal;
         return;
     }
     Mat3 held = Mat3::Zero();
@@ -439,6 +460,11 @@ SoftRow ContactResponse::makeRow(Touch& touch, const CoupledSystem& system) cons
     row.body = touch.dynamicBody;
     row.arm = touch.arm;
     row.carried = touch.carried;
+    if (touch.jammed) {
+        row.stiffness = touch.kappa * Mat3::Identity();
+        row.load = touch.kappa * touch.between * c.normal;
+        return row;
+    }
     row.stiffness = touch.kappa * c.normal * c.normal.transpose();
     row.load = (touch.kappa * touch.target + touch.lambda) * c.normal;
     addFriction(touch, row.stiffness, row.load);
@@ -466,8 +492,8 @@ bool ContactResponse::update(const CoupledSystem& system, const IslandVelocities
     const bool slid = !released && !entered && !bounced && updateFriction(system);
     if (released || entered || bounced) relaxDamping();
     const bool changed = released || entered || bounced || slid;
-    if (changed && round + 2 == kMaxRounds) dropExcessFriction();
-    return changed && round + 1 < kMaxRounds;
+    if (changed && isLast(round + 1)) dropExcessFriction();
+    return changed && !isLast(round);
 }
 
 /// All at once after the first solve; later only what ends deep inside a body, and friction.
@@ -476,7 +502,7 @@ bool ContactResponse::updateQuickly(const IslandVelocities& solved, const Points
     const bool released = round == 0 && releasePulling(round);
     const bool entered = (round == 0 || isAnyDeep()) && closeFound(solved, round);
     const bool slid = updateFrictionQuickly(rough);
-    return (released || entered || slid) && round + 1 < m_care.rounds;
+    return (released || entered || slid) && !isLast(round);
 }
 
 void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelocities& solved) {
@@ -487,6 +513,11 @@ void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelo
         if (!touch.isRow) continue;
         const Vec3 u = relativeVelocity(touch, solved);
         const Vec3& n = touch.contact.normal;
+        if (touch.jammed) {
+            touch.impulse = touch.kappa * (touch.between * n - u);
+            touch.normalImpulse = n.dot(touch.impulse);
+            continue;
+        }
         touch.normalImpulse = touch.lambda + touch.kappa * (touch.target - u.dot(n));
         Mat3 damping = Mat3::Zero();
         touch.impulse = touch.normalImpulse * n;
@@ -523,10 +554,22 @@ bool ContactResponse::releasePulling(int round) {
             ++touch.changes;
             changed = true;
         } else if (touch.isRow && !touch.isPinched) {
-            touch.lambda = std::max(touch.normalImpulse, 0.0);
+            raiseMultiplier(touch);
         }
     }
-    return changed && round + 1 < kMaxRounds;
+    return changed && !isLast(round);
+}
+
+/// As an augmented Lagrangian has it. Between walls that cannot all be met the multipliers would grow without bound:
+/// one that leaves most of what it was raised for is put back, and the penalty alone holds that contact in this step.
+void ContactResponse::raiseMultiplier(Touch& touch) const {
+    constexpr double kVain = 0.5;  // of what was missing
+    const double missing = (touch.normalImpulse - touch.lambda) / touch.kappa;
+    const bool isVain = touch.dynamicBody < 0 && touch.missed > 0.0 && missing > kVain * touch.missed &&
+                        missing * m_input.h > m_vertexSlop;
+    touch.isVain = touch.isVain || touch.jammed || isVain;
+    touch.lambda = touch.isVain ? 0.0 : std::max(touch.normalImpulse, 0.0);
+    touch.missed = missing;
 }
 
 std::vector<double> ContactResponse::speedsBeside(const Points& a, const Points& b) const {
@@ -546,13 +589,13 @@ void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
     m_memory.clear();
     m_memoryStep = m_input.h;
     for (const Touch& touch : m_touches) {
-        const bool pushes = touch.active && touch.normalImpulse > 0.0 && !touch.bounces;
+        const bool pushes = touch.active && (touch.normalImpulse > 0.0 || touch.isVain) && !touch.bounces;
         if (!touch.impulse.isZero(0.0))  // took part in the last solve
             impulses.push_back({touch.contact, touch.impulse, touch.sticks || creeps(touch), touch.slide});
         // Vertices that come and go in a sliding sheet are not without friction in the step in which they come back.
         const bool maySlideOn = isQuick() && touch.contact.isVertex() && touch.slip.known;
         if ((pushes || maySlideOn) && !m_forgotten.count(touch.contact.body))
-            m_memory[keyOf(touch.contact)] = {pushes ? touch.normalImpulse : 0.0,
+            m_memory[keyOf(touch.contact)] = {pushes && !touch.isVain ? touch.normalImpulse : 0.0,
                                               pushes ? touch.offset : 0.0,
                                               touch.sticks,
                                               touch.slip,

@@ -25,8 +25,6 @@ struct IslandVelocities {
 /// and a body on a pinned vertex become soft rows, made exact by an augmented Lagrangian over the rounds.
 class ContactResponse {
   public:
-    static constexpr int kMaxRounds = 16;  ///< usually 1 to 3; more while a body hits
-
     /// How an island is numbered.
     struct Numbering {
         const std::vector<int>& offsets;       ///< of each shell's vertices
@@ -46,7 +44,9 @@ class ContactResponse {
     double deepestGap() const { return m_deepestGap; }
     /// Whether nothing rests on the contacts and the shells give way: they are then looked at once, after a rough
     /// solve, again only where a vertex ends deep inside a body, and pushOut does what is left.
-    bool isQuick() const { return m_care.rounds < kMaxRounds; }
+    bool isQuick() const { return m_care.rounds < kInFull.rounds; }
+    /// Whether a round is the last one that may be.
+    bool isLast(int round) const { return round + 1 >= m_care.rounds; }
     /// Whether anything is near.
     bool hasContacts() const { return !m_touches.empty(); }
     /// Moves vertices that end inside a body out of it, after finish. `v`: velocities of all vertices; `impulses`: what
@@ -82,13 +82,17 @@ class ContactResponse {
         double allowedGap = 0.0;  ///< <= 0: what it stood inside at the start and need not leave at once [m]
         bool active = false, sticks = false, isRow = false;
         double lambda = 0.0, kappa = 0.0;  ///< soft rows: multiplier [N s] and penalty [kg]
+        double missed = 0.0;               ///< by which its multiplier was last raised, if it still aims at that [m/s]
+        bool isVain = false;               ///< its multiplier does not help: others hold it where it is
         bool isPinched = false;            ///< a soft row of vertices that another body holds
         bool bounces = false;              ///< its target is that of restitution
-        bool jammed = false;               ///< walls on both sides leave the vertex no room
+        bool jammed = false;               ///< walls on both sides leave it no room
+        double between = 0.0;              ///< its target then: half way to the other wall [m/s]
         Slip slip;
-        int flips = 0;        ///< between sticking and sliding, in this step
-        double offset = 0.0;  ///< how far it is kept off the surface for its chords' sake [m]
-        double lifted = 0.0;  ///< by how much that grew in this round [m]
+        int flips = 0;         ///< between sticking and sliding, in this step
+        bool pressed = false;  ///< a wall faces it: it is not to be kept off the surface
+        double offset = 0.0;   ///< how far it is kept off the surface for its chords' sake [m]
+        double lifted = 0.0;   ///< by how much that grew in this round [m]
         double normalImpulse = 0.0;
         Vec3 impulse{0, 0, 0};  ///< on the shell [N s]
         Vec3 slide{0, 0, 0};    ///< tangential velocity relative to the body in the last solve [m/s]
@@ -99,7 +103,9 @@ class ContactResponse {
         int rounds;   ///< solves, at most
         double pull;  ///< of the largest impulse: a contact that pulls less may stay for the step
     };
-    static constexpr Care kInFull{kMaxRounds, 1e-3};
+    static constexpr Care kInFull{16, 1e-3};  ///< usually 1 to 3 are made; more while a body hits
+    /// What is stiff for its mesh passes on what a contact does to all others. Its rounds are cheap: see ShellFactor.
+    static constexpr Care kStiff{48, 1e-3};
     static constexpr Care kAmongWalls{6, 0.02};
     /// What a contact's point is moved by, along the normal, at the end of the step.
     struct Push {
@@ -132,6 +138,7 @@ class ContactResponse {
     static constexpr double kNearEdge = 0.1;    ///< weight of a triangle's corner below which its contact is an edge's
     static constexpr int kMostChanges = 10;     ///< a contact that flips more often than this stays as it is
 
+    static bool isFacing(const Contact& a, const Contact& b) { return a.normal.dot(b.normal) < -0.7; }
     /// Projector on the directions across a normal.
     static Mat3 tangential(const Vec3& n) { return Mat3::Identity() - n * n.transpose(); }
     Key keyOf(const Contact& c) const;
@@ -152,7 +159,8 @@ class ContactResponse {
     void alter(Touch& touch, Points& y) const;
     std::vector<VertexConstraint> holdConstraints() const;
     bool joinFilter(int touch, std::vector<VertexConstraint>& constraints);
-    bool isPinched(const VertexFilter& filter, double& target) const;
+    void jam(Touch& touch, const Touch& other) const;
+    void findJams();
     void finishFilter(VertexFilter& filter, VertexConstraint& constraint, std::vector<SoftRow>& rows);
     SoftRow makeRow(Touch& touch, const CoupledSystem& system) const;
     bool isBetweenBodies(const Touch& touch) const;
@@ -160,6 +168,7 @@ class ContactResponse {
     double vertexStiffness(const CoupledSystem& system, const Touch& touch) const;
     void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);
     bool releasePulling(int round);
+    void raiseMultiplier(Touch& touch) const;
     double leavingSpeed(const Touch& touch) const;
     bool isAnyBouncy() const;
     bool bounce(const IslandVelocities& solved);
@@ -193,6 +202,8 @@ class ContactResponse {
     bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
     int touchOf(const Contact& contact) const;
     bool closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round);
+    bool entersThere(const Contact& contact, const Touch& touch, const IslandVelocities& solved) const;
+    void putDown(const Contact& contact);
     bool liftVertices(const Contact& contact, double by, const IslandVelocities& solved);
     double endGap(const Touch& touch, const IslandVelocities& solved) const;
     int globalVertex(const Contact& c, int corner) const { return m_offsets[c.shell] + c.vertices[corner]; }

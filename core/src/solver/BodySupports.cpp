@@ -2,10 +2,13 @@
 
 #include <Eigen/Cholesky>
 
+#include <algorithm>
+
 namespace jacket {
 namespace {
 
-constexpr double kPull = 1e-2;   // of a body's weight: a contact that pulls less may stay for the step
+constexpr double kPull = 1e-2;   // of a body's weight, or of what is pressed onto its most loaded contact: a contact
+                                 // that pulls less may stay for the step
 constexpr int kMostReturns = 1;  // a contact that has let go twice stays away: it closes in the bodies' own step
 
 }  // namespace
@@ -92,12 +95,30 @@ double BodySupports::lightest(int body) const {
     return m_mass[body].diagonal().head<3>().minCoeff();
 }
 
+/// Of each body what it rests on, or rests on it, bears most [N s]. A solve is only as exact as its largest impulses
+/// let it be: what it leaves of them is no pull.
+std::vector<double> BodySupports::loads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) const {
+    std::vector<double> most(m_mass.size(), 0.0);
+    for (const auto& [body, contact, hold] : m_supports)
+        if (hold.holds)
+            most[body] = std::max(most[body], contact.weight * (contact.velocity - contact.row.dot(w.col(body))));
+    for (const auto& [contact, hold] : m_pairs) {
+        if (!hold.holds) continue;
+        const double load = -contact.weight * (contact.rowA.dot(w.col(contact.a)) + contact.rowB.dot(w.col(contact.b)));
+        most[contact.a] = std::max(most[contact.a], load);
+        most[contact.b] = std::max(most[contact.b], load);
+    }
+    return most;
+}
+
 bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, double kick) {
     bool changed = false;
+    const std::vector<double> load = loads(w);
     for (Support& support : m_supports) {
         const auto& [row, velocity, weight] = support.contact;
         const double opening = row.dot(w.col(support.body)) - velocity;
-        if (!support.hold.turn(opening, lightest(support.body) * kPull * kick / weight)) continue;
+        const double pull = kPull * std::max(lightest(support.body) * kick, load[support.body]);
+        if (!support.hold.turn(opening, pull / weight)) continue;
         const double sign = support.hold.holds ? 1.0 : -1.0;
         m_mass[support.body] += sign * weight * row * row.transpose();
         m_momentum[support.body] += sign * weight * velocity * row;
@@ -107,7 +128,8 @@ bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, dou
     for (Pair& pair : m_pairs) {
         const auto& [a, b, rowA, rowB, weight] = pair.contact;
         const double opening = rowA.dot(w.col(a)) + rowB.dot(w.col(b));
-        if (!pair.hold.turn(opening, std::min(lightest(a), lightest(b)) * kPull * kick / weight)) continue;
+        const double pull = kPull * std::max(std::min(lightest(a), lightest(b)) * kick, std::min(load[a], load[b]));
+        if (!pair.hold.turn(opening, pull / weight)) continue;
         add(pair, pair.hold.holds ? 1.0 : -1.0);
         changed = true;
     }

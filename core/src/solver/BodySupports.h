@@ -39,6 +39,7 @@ class BodySupports {
 
     void add(const Pair& pair, double sign);
     double lightest(int body) const;
+    std::vector<double> loads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) const;
     void solveFreeTwists();
 
     std::vector<Support> m_supports;

@@ -26,6 +26,7 @@ void CoupledPreconditioner::build(const CoupledSystem& system, Preconditioner ki
     m_kind = system.precision() == Precision::Single ? Preconditioner::IncompleteCholesky : kind;
     m_factors.resize(system.shells().size());
     m_inverseBlocks.resize(system.shells().size());
+    m_complete.resize(system.shells().size());
     for (std::size_t i = 0; i < system.shells().size(); ++i) buildShell(system, i, m_kind);
     updateBodies(system);
 }
@@ -44,12 +45,37 @@ void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t 
         buildCoarse(system, part);
         return;
     }
+    if (factorCompletely(system, shell)) return;
     if (kind == Preconditioner::IncompleteCholesky) {
         m_factors[shell].factor(*part.matrix, m_diagonal, m_lower);
     } else {
         m_inverseBlocks[shell].resize(m_diagonal.size());
         for (std::size_t i = 0; i < m_diagonal.size(); ++i) m_inverseBlocks[shell][i] = m_diagonal[i].inverse();
     }
+}
+
+bool CoupledPreconditioner::factorCompletely(const CoupledSystem& system, std::size_t shell) {
+    const auto& part = system.shells()[shell];
+    if (!part.isStiff || m_lower.empty()) {
+        m_complete[shell].reset();
+        return false;
+    }
+    if (!m_complete[shell]) m_complete[shell] = std::make_unique<ShellFactor>();
+    findFree(system, part);
+    if (m_complete[shell]->factor(*part.matrix, m_diagonal, m_lower, m_free)) return true;
+    m_complete[shell].reset();
+    return false;
+}
+
+bool CoupledPreconditioner::isComplete() const {
+    return std::any_of(m_complete.begin(), m_complete.end(), [](const auto& factor) { return factor != nullptr; });
+}
+
+void CoupledPreconditioner::findFree(const CoupledSystem& system, const CoupledSystem::ShellPart& part) {
+    m_free.assign(part.matrix->size(), nullptr);
+    for (const auto& c : system.constraints())
+        if (c.vertex >= part.offset && c.vertex < part.offset + part.matrix->size())
+            m_free[c.vertex - part.offset] = &c.free;
 }
 
 void CoupledPreconditioner::buildCoarse(const CoupledSystem& system, const CoupledSystem::ShellPart& part) {
@@ -133,6 +159,48 @@ void CoupledPreconditioner::updateBodies(const CoupledSystem& system) {
     for (std::size_t b = 0; b < blocks.size(); ++b) m_bodies[b].compute(blocks[b]);
     m_groups.clear();
     if (!system.couplings().empty()) factorGroups(system, blocks);
+    m_columns.clear();
+    if (isComplete() && system.bodyCount() > 0) eliminateShells(system);
+}
+
+/// C - B^T A^-1 B of the bodies, A and B those of the shells that are factored completely: a stiff shell and a body
+/// that move as one have little inertia beside what each has against the other.
+void CoupledPreconditioner::eliminateShells(const CoupledSystem& system) {
+    const int size = 6 * system.bodyCount();
+    Eigen::MatrixXd schur(size, size);
+    CoupledVector unit;
+    unit.resize(system.vertexCount(), system.bodyCount());
+    m_columns.resize(size);
+    m_solved.resize(size);
+    for (int k = 0; k < size; ++k) {
+        unit.w.setZero();
+        unit.w(k % 6, k / 6) = 1.0;
+        m_columns[k].resize(system.vertexCount(), system.bodyCount());
+        m_solved[k].resize(system.vertexCount(), system.bodyCount());
+        system.apply(unit, m_columns[k]);
+        schur.col(k) = m_columns[k].w.reshaped();
+        for (std::size_t i = 0; i < m_complete.size(); ++i) {
+            const int offset = 3 * system.shells()[i].offset;
+            if (m_complete[i]) m_complete[i]->apply(m_columns[k].s.data() + offset, m_solved[k].s.data() + offset);
+        }
+        system.filter(m_solved[k]);
+    }
+    for (int a = 0; a < size; ++a)
+        for (int b = 0; b < size; ++b) schur(a, b) -= alongComplete(system, m_columns[a].s, m_solved[b].s);
+    m_schur.compute(schur);
+}
+
+/// a . b over the shells that are factored completely.
+double CoupledPreconditioner::alongComplete(const CoupledSystem& system, const Points& a, const Points& b) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < m_complete.size(); ++i) {
+        const auto& part = system.shells()[i];
+        if (!m_complete[i]) continue;
+        sum += a.middleCols(part.offset, part.matrix->size())
+                   .cwiseProduct(b.middleCols(part.offset, part.matrix->size()))
+                   .sum();
+    }
+    return sum;
 }
 
 void CoupledPreconditioner::factorGroups(const CoupledSystem& system, const std::vector<Mat6>& blocks) {
@@ -162,15 +230,22 @@ void CoupledPreconditioner::factorGroups(const CoupledSystem& system, const std:
 void CoupledPreconditioner::apply(const CoupledSystem& system, const CoupledVector& r, CoupledVector& z) const {
     for (std::size_t i = 0; i < system.shells().size(); ++i) {
         const auto& part = system.shells()[i];
-        if (m_kind == Preconditioner::IncompleteCholesky) {
+        if (m_complete[i]) {
+            m_complete[i]->apply(r.s.data() + 3 * part.offset, z.s.data() + 3 * part.offset);
+        } else if (m_kind == Preconditioner::IncompleteCholesky) {
             m_factors[i].apply(r.s.data() + 3 * part.offset, z.s.data() + 3 * part.offset);
         } else {
             for (int k = 0; k < part.matrix->size(); ++k)
                 z.s.col(k + part.offset).noalias() = m_inverseBlocks[i][k] * r.s.col(k + part.offset);
         }
     }
-    applyToBodies(r.w, z.w);
     system.filter(z);
+    if (m_columns.empty()) return applyToBodies(r.w, z.w);
+    Eigen::VectorXd twists = r.w.reshaped();
+    for (Eigen::Index k = 0; k < twists.size(); ++k) twists[k] -= alongComplete(system, m_columns[k].s, z.s);
+    m_schur.solveInPlace(twists);
+    for (Eigen::Index k = 0; k < twists.size(); ++k) z.s -= twists[k] * m_solved[k].s;
+    z.w.reshaped() = twists;
 }
 
 void CoupledPreconditioner::apply(const CoupledSystem& system, const CompactVector& r, CompactVector& z) const {

@@ -1,16 +1,20 @@
 #pragma once
 #include <Eigen/Cholesky>
+#include <memory>
 #include <vector>
 
 #include "jacket/Shell.h"
 #include "solver/CoarseSpace.h"
 #include "solver/CoupledSystem.h"
 #include "solver/IncompleteCholesky.h"
+#include "solver/ShellFactor.h"
 
 namespace jacket {
 
 /// P^-1 of an island: per shell 3x3 blocks or an incomplete factor of the filtered matrix, per body the 6x6 block
-/// M_b + sum_ij G_i^T A_ij G_j of the operator; bodies whose masses are coupled are factored together.
+/// M_b + sum_ij G_i^T A_ij G_j of the operator; bodies whose masses are coupled are factored together. Where shells are
+/// factored completely they are eliminated, and what is left of the bodies is too: P is the operator then, but for
+/// other shells.
 class CoupledPreconditioner {
   public:
     void build(const CoupledSystem& system, Preconditioner kind);
@@ -25,10 +29,16 @@ class CoupledPreconditioner {
     /// Whether every shell has a coarse space: r^T P^-1 r then weighs rigid motions of parts as the others. Without, it
     /// makes little of them.
     bool isCoarse(const CoupledSystem& system) const;
+    /// Whether some shell is factored completely.
+    bool isComplete() const;
 
   private:
     void buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind);
+    bool factorCompletely(const CoupledSystem& system, std::size_t shell);
+    void findFree(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
     void buildCoarse(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
+    void eliminateShells(const CoupledSystem& system);
+    double alongComplete(const CoupledSystem& system, const Points& a, const Points& b) const;
     void applyToBodies(const Eigen::Matrix<double, 6, Eigen::Dynamic>& r,
                        Eigen::Matrix<double, 6, Eigen::Dynamic>& z) const;
     void addRows(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
@@ -45,6 +55,9 @@ class CoupledPreconditioner {
     std::vector<const Mat3*> m_free;        ///< scratch
     std::vector<CoarseSpace::Tie> m_ties;   ///< scratch
     std::vector<IncompleteCholesky> m_factors;
+    std::vector<std::unique_ptr<ShellFactor>> m_complete;  ///< of each shell; null: not factored completely
+    std::vector<CoupledVector> m_columns, m_solved;        ///< shells' part of the bodies' columns, and A^-1 of it
+    Eigen::LDLT<Eigen::MatrixXd> m_schur;                  ///< of all bodies' twists, where shells are eliminated
     std::vector<std::vector<Mat3>> m_inverseBlocks;
     std::vector<Eigen::LDLT<Mat6>> m_bodies;
     std::vector<BodyGroup> m_groups;
