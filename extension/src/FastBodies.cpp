@@ -37,7 +37,7 @@ FastBodies::FastBodies(btCollisionWorld& world, Obstacles& obstacles, std::span<
         const btRigidBody* body = btRigidBody::upcast(objects[i]);
         if (!body || body->isStaticOrKinematicObject() || !body->isActive() || !body->hasContactResponse()) continue;
         if (!mayBeFast(*body, h)) continue;
-        Obstacle obstacle = obstacles.make(*objects[i], h, nullptr);
+        Obstacle obstacle = obstacles.make(*objects[i], h, nullptr, true);
         const auto known = solved.find(objects[i]);
         const Vec6 unsolved = obstacle.body.freeTwist - (known == solved.end() ? Vec6(Vec6::Zero()) : known->second);
         if (!(unsolved.head<3>().norm() * h > obstacle.body.inner)) continue;

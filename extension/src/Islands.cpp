@@ -83,18 +83,14 @@ std::vector<int> IslandFinder::leaders(const std::vector<Obstacle>& obstacles,
 
 std::vector<Island> IslandFinder::find(double h, bool hasMoved) {
     RigidContacts contacts(*m_world.getDispatcher());
-    if (!hasMoved) {
-        std::vector<btCollisionObject*> objects;
-        for (const Neighbour& n : m_neighbours) objects.push_back(n.object);
-        for (btCollisionObject* object : contacts.join(objects)) m_neighbours.push_back({object, {}, {}});
-        sort();
-    }
+    std::vector<btCollisionObject*> objects;
+    for (const Neighbour& n : m_neighbours) objects.push_back(n.object);
+    for (btCollisionObject* object : contacts.join(objects)) m_neighbours.push_back({object, {}, {}});
+    sort();
     std::vector<Obstacle> obstacles;
-    for (const Neighbour& n : m_neighbours)
-        obstacles.push_back(m_obstacles.make(*n.object, h, hasMoved ? nullptr : &contacts));
+    for (const Neighbour& n : m_neighbours) obstacles.push_back(m_obstacles.make(*n.object, h, &contacts, hasMoved));
     const std::vector<BodyCoupling> couplings = coupleLinks(obstacles, m_world, hasMoved ? 0.0 : h);
-    const std::vector<RigidContact> rigidContacts =
-        hasMoved ? std::vector<RigidContact>() : contacts.between(obstacles);
+    const std::vector<RigidContact> rigidContacts = contacts.between(obstacles);
     std::vector<std::pair<int, int>> joined;
     for (const auto& c : couplings) joined.emplace_back(c.a, c.b);
     for (const auto& c : rigidContacts) joined.emplace_back(c.a, c.b);

@@ -52,8 +52,7 @@ Frame moved(const Frame& start, const Vec6& twist, double time) {
     return frame;
 }
 
-Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContacts* contacts) {
-    const bool hasMoved = !contacts;
+Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContacts* contacts, bool hasMoved) {
     Obstacle obstacle{&object, &piecesOf(*object.getCollisionShape()), fromBullet(object.getWorldTransform()), {}};
     CoupledBody& coupled = obstacle.body;
     btVector3 centre;
@@ -82,7 +81,7 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContact
         if (moves && !hasMoved && m_gravityIsNoForce)
             coupled.freeTwist.head<3>() += h * fromBullet(rigid->getGravity());
         if (moves) coupled.mass = massOf(*rigid);
-        if (moves && contacts) contacts->addSupports(*rigid, h, coupled);
+        if (moves && contacts) contacts->addSupports(*rigid, hasMoved ? 0.0 : h, coupled);
     }
     coupled.position = obstacle.start.translation();
     return obstacle;

@@ -36,10 +36,10 @@ struct Obstacle {
 /// Makes obstacles of Bullet's collision objects; keeps the pieces of every shape it has met.
 class Obstacles {
   public:
-    /// Static, kinematic and sleeping bodies become bodies of prescribed motion. `contacts`: what holds bodies in the
-    /// coming step; without it every body starts where it stood h ago, with the velocity that it has: the motion that
-    /// Bullet has already made. Links that are not prescribed get their mass from coupleLinks.
-    Obstacle make(btCollisionObject& object, double h, const RigidContacts* contacts);
+    /// Static, kinematic and sleeping bodies become bodies of prescribed motion. `contacts`: what holds bodies, or
+    /// null. `hasMoved`: every body starts where it stood h ago, with the velocity that it has: the motion that Bullet
+    /// has already made, instead of the coming one. Links that are not prescribed get their mass from coupleLinks.
+    Obstacle make(btCollisionObject& object, double h, const RigidContacts* contacts, bool hasMoved);
     /// Shapes without any piece that shells can touch are reported here once, by Bullet's name of the shape.
     std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }
     /// Before anything else in a step: what moves without Bullet's doing is known by its poses at two steps.

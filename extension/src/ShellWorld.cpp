@@ -14,12 +14,14 @@
 #include <unordered_map>
 
 #include "ArticulatedBody.h"
+#include "CarriedVertices.h"
 #include "Checks.h"
 #include "ContactManifolds.h"
 #include "Convert.h"
 #include "CoupledLinks.h"
 #include "FastBodies.h"
 #include "Islands.h"
+#include "ObjectId.h"
 #include "ShellContacts.h"
 #include "ShellProxy.h"
 #include "Sleepers.h"
@@ -28,9 +30,6 @@
 
 namespace jacket::bullet {
 namespace {
-
-constexpr double kTeleport =
-    50.0;  // a body that strays faster than this from what was solved has been teleported [m/s]
 
 double seconds() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -56,20 +55,20 @@ class TimedDetector : public ContactDetector {
     double& m_sum;
 };
 
-/// The broadphase's id of an object of this world, -1 if it is not there. An object that is allocated where a removed
-/// one was has another id (with btDbvtBroadphase; broadphases that count slots may give the same again).
-int idOf(const btCollisionWorld& world, const btCollisionObject* object) {
-    const auto& objects = world.getCollisionObjectArray();
-    for (int i = 0; i < objects.size(); ++i)
-        if (objects[i] == object) return object->getBroadphaseHandle()->getUid();
-    return -1;
-}
-
 /// Speed of a collision object's centre of mass [m/s].
 double speedOf(const btCollisionObject& object) {
     if (const auto* body = btRigidBody::upcast(&object)) return double(body->getLinearVelocity().length());
     if (const auto* link = btMultiBodyLinkCollider::upcast(&object)) return twistOf(*link).head<3>().norm();
     return 0.0;
+}
+
+/// Puts a free body that has moved already where the solve of its motion, which followed, lets it be.
+void moveAnew(btCollisionWorld& world, const Obstacle& obstacle, const Vec6& solved, double h) {
+    btRigidBody* body = btRigidBody::upcast(obstacle.object);
+    if (!body || obstacle.body.prescribed || solved == obstacle.body.freeTwist) return;
+    const Vec6 twist = obstacle.body.startTwist + solved - obstacle.body.freeTwist;
+    body->setCenterOfMassTransform(toBullet(moved(obstacle.start, twist, h)));
+    world.updateSingleAabb(body);
 }
 
 /// Fastest that any point of any moving object goes, roughly: how far bounds must reach ahead [m/s].
@@ -84,17 +83,6 @@ double fastestObject(const btCollisionWorld& world) {
 
 }  // namespace
 
-/// A vertex that moves with a body until the next step: what the solve assumed of the body, to be replaced by what
-/// Bullet did with it.
-struct CarriedVertex {
-    int shell, vertex;
-    const btCollisionObject* object;
-    int objectId;
-    Frame start;
-    Vec6 twist;
-    std::optional<Vec3> anchor;  ///< where the vertex is tied, in the body's frame
-};
-
 /// What the shells gave a body in a step, as one impulse.
 struct Push {
     Vec3 impulse = Vec3::Zero();  ///< [N s]
@@ -104,7 +92,7 @@ struct Push {
 struct ShellWorld::Impl {
     Obstacles obstacles;
     std::map<const ShellBody*, IslandSolver> solvers;  ///< of each island, by its first shell
-    std::vector<CarriedVertex> carried;
+    CarriedVertices carried;
     FastBodies::Solved solved;
     std::unordered_map<const btCollisionObject*, Push> pushes;
     ContactManifolds manifolds;
@@ -248,27 +236,30 @@ void ShellWorld::releaseAnchors(btCollisionWorld& world) {
 }
 
 /// Shells that were added, or given a velocity, since the last step have no solved velocity to move with: they get one
-/// for the motion that the bodies have already made.
+/// for the motion that the bodies have already made. Bodies that they push in it have gone too far, or not far enough.
 void ShellWorld::solveNewcomers(btCollisionWorld& world, double h) {
     std::vector<ShellBody*> newcomers;
     for (const auto& shell : m_shells)
         if (!shell->m_hasVelocity && !shell->isAsleep()) newcomers.push_back(shell.get());
     if (newcomers.empty()) return;
-    for (Island& island : IslandFinder(world, m_impl->obstacles, newcomers).find(h, true)) solveIsland(island, h);
+    const double fastest = fastestObject(world);
+    for (ShellBody* shell : newcomers) {  // Bullet's pairs know nothing of how they move
+        updateBounds(*shell, fastest, h);
+        world.updateSingleAabb(shell->m_proxy.get());
+    }
+    world.computeOverlappingPairs();
+    for (Island& island : IslandFinder(world, m_impl->obstacles, newcomers).find(h, true)) {
+        solveIsland(island, h);
+        for (const Obstacle& obstacle : island.obstacles)
+            if (const auto known = m_impl->solved.find(obstacle.object); known != m_impl->solved.end())
+                moveAnew(world, obstacle, known->second, h);
+    }
 }
 
 void ShellWorld::moveShells(btCollisionWorld& world, double h) {
     for (const auto& shell : m_shells)
         if (shell->m_hasVelocity && !shell->isAsleep()) shell->m_shell.advance(h);
-    for (const CarriedVertex& c : m_impl->carried) {
-        if (idOf(world, c.object) != c.objectId || m_shells[c.shell]->isAsleep()) continue;
-        Shell& shell = m_shells[c.shell]->m_shell;
-        const Vec3 assumed = shell.positions().col(c.vertex);
-        const Vec3 local = c.anchor ? *c.anchor : moved(c.start, c.twist, h).inverse(Eigen::Isometry) * assumed;
-        const Vec3 by = fromBullet(c.object->getWorldTransform()) * local - assumed;
-        if (by.norm() < kTeleport * h && by.allFinite()) shell.displace(c.vertex, by);
-    }
-    m_impl->carried.clear();
+    m_impl->carried.move(world, h);
     for (const auto& shell : m_shells)
         if (!shell->isAsleep()) shell->publish();
 }
@@ -335,16 +326,11 @@ void ShellWorld::accept(Island& island, const StepReport& report, const std::vec
     }
 }
 
-void ShellWorld::carry(const ShellBody& shell, int vertex, const Island& island, int body,
+void ShellWorld::carry(ShellBody& shell, int vertex, const Island& island, int body,
                        const std::vector<CoupledBody>& coupled, const Vec3* anchor) {
     const Obstacle& obstacle = island.obstacles[body];
     if (standsStill(*obstacle.object) && !anchor) return;
-    std::optional<Vec3> local;
-    if (anchor) local = obstacle.start.inverse(Eigen::Isometry) * *anchor;
-    const auto index = std::find_if(m_shells.begin(), m_shells.end(), [&](const auto& s) { return s.get() == &shell; });
-    m_impl->carried.push_back({static_cast<int>(index - m_shells.begin()), vertex, obstacle.object,
-                               obstacle.object->getBroadphaseHandle()->getUid(), obstacle.start, coupled[body].twist,
-                               local});
+    m_impl->carried.add(shell, vertex, obstacle, coupled[body].twist, anchor);
 }
 
 void ShellWorld::react(btCollisionObject& object, const CoupledBody& coupled) {

@@ -117,7 +117,7 @@ void Sleepers::wakeTouched(double h) {
 }
 
 bool Sleepers::touches(const ShellBody& shell, btCollisionObject& object, double h) {
-    const std::vector<Obstacle> obstacle{m_obstacles.make(object, h, nullptr)};
+    const std::vector<Obstacle> obstacle{m_obstacles.make(object, h, nullptr, true)};
     const double speed = obstacle[0].body.freeTwist.head<3>().norm() +
                          obstacle[0].body.freeTwist.tail<3>().norm() * std::min(obstacle[0].body.radius, 1e3);
     if (speed < kSlow) return false;

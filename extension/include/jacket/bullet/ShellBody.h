@@ -112,6 +112,7 @@ class ShellBody {
 
   private:
     friend class ShellWorld;
+    friend class CarriedVertices;
     friend class FastBodies;
     friend class IslandFinder;
     friend class Sleepers;

@@ -86,8 +86,8 @@ class ShellWorld : public btActionInterface {
     void solveIsland(Island& island, double h);
     void accept(Island& island, const StepReport& report, const std::vector<CoupledBody>& coupled,
                 const Vec3& pendingGravity);
-    void carry(const ShellBody& shell, int vertex, const Island& island, int body,
-               const std::vector<CoupledBody>& coupled, const Vec3* anchor);
+    void carry(ShellBody& shell, int vertex, const Island& island, int body, const std::vector<CoupledBody>& coupled,
+               const Vec3* anchor);
     void react(btCollisionObject& object, const CoupledBody& coupled);
     void forgetPushes(const btCollisionWorld& world);
     void updateAllBounds(double h);
