@@ -91,7 +91,7 @@ struct IslandSolver::Impl {
     void beginTwoStep(const IslandInput& input, std::size_t shell);
     void assemble(const IslandInput& input, bool atEnd);
     void readFreeTwists();
-    bool overstretches(const IslandInput& input, bool isSuspect) const;
+    bool overstretches(const IslandInput& input, bool isAgain) const;
     double elasticEnergyAfter(const IslandInput& input, std::size_t shell, const Points& velocities) const;
     double energyGain(const IslandInput& input) const;
     bool bodiesLead(const IslandInput& input) const;
@@ -276,9 +276,10 @@ double IslandSolver::Impl::elasticEnergyAfter(const IslandInput& input, std::siz
 
 /// Whether the solved step must be linearised again: it stretches an edge by far, or it gains energy. Backward Euler
 /// itself gains none; its one linear solve does where stiff shells turn far in a step. That is looked for only where
-/// edges change their lengths at all, or where the step is suspect already.
-bool IslandSolver::Impl::overstretches(const IslandInput& input, bool isSuspect) const {
+/// edges change their lengths at all; `isAgain`: in a step that has been linearised again, for much of it in any case.
+bool IslandSolver::Impl::overstretches(const IslandInput& input, bool isAgain) const {
     constexpr double kMost = 0.1, kSuspect = 1e-3;  // change of an edge in one step, in rest lengths
+    bool isSuspect = false;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         const auto edges = shell.mesh().edges();
@@ -287,7 +288,8 @@ bool IslandSolver::Impl::overstretches(const IslandInput& input, bool isSuspect)
         if (stretch.lengthening > kMost) return true;
         isSuspect = isSuspect || stretch.change > kSuspect;
     }
-    return isSuspect && energyGain(input) > (dynamicBodies.empty() ? kEnergyGainAlone : kEnergyGain);
+    if (!isSuspect) return isAgain && energyGain(input) > kMostEnergyGain;
+    return energyGain(input) > (dynamicBodies.empty() ? kEnergyGainAlone : kEnergyGain);
 }
 
 /// Where Newton's method does not settle, as in a stiff shell pinched between bodies, the step would throw the shell
