@@ -71,13 +71,22 @@ PatchEnergy::PatchEnergy(const HalfEdgeMesh& mesh, const RestShape& rest, const 
     const MirroredMesh mirrored(mesh, rest.mirrors, rest.rigid);
     {
         const std::vector<Patch> patches = makePatches(mesh, mirrored, rest.positions);
-        m_elements.reserve(patches.size());
+        reserve(patches);
         for (int t = 0; t < mesh.triangleCount(); ++t) setUp(t, plates[t], mirrored, patches[t], rest);
     }
     assembleConstant(mesh.vertexCount());
     const auto isFlatForGood = [](const Element& e) { return !e.isCurved() && !e.canYield(); };
     if (!rest.flattened && std::all_of(m_elements.begin(), m_elements.end(), isFlatForGood)) keepMirroredOnly(rest);
     m_padded.setZero(4, mesh.vertexCount());
+}
+
+/// What `setUp` fills; vertices that are seen in mirrors may need more.
+void PatchEnergy::reserve(const std::vector<Patch>& patches) {
+    std::size_t nodes = 0;
+    for (const Patch& patch : patches) nodes += patch.nodes.size();
+    m_elements.reserve(patches.size());
+    m_vertices.reserve(nodes);
+    m_rows.reserve(nodes);
 }
 
 Mat3 PatchEnergy::Element::plateMatrix() const {
@@ -223,7 +232,7 @@ void PatchEnergy::keepMirroredOnly(const RestShape& rest) {
     vertices.shrink_to_fit();
     m_elements = std::move(elements);
     m_vertices = std::move(vertices);
-    m_rows = {};
+    m_rows = std::vector<Vec3>();  // gives its memory back, which {} does not
     m_flatRest = rest.positions.colwise() - rest.positions.rowwise().mean();
     m_inverseMoments =
         Mat3(m_flatRest * m_flatRest.transpose()).completeOrthogonalDecomposition().pseudoInverse();  // rank 2

@@ -62,6 +62,7 @@ class PatchEnergy final : public Energy {
     const int* verticesOf(const Element& e) const { return m_vertices.data() + e.vertices; }
     const Vec3* rowsOf(const Element& e) const { return m_rows.data() + e.rows; }
     int columnsOf(const Element& e) const;
+    void reserve(const std::vector<Patch>& patches);
     void setUp(int triangle, const Plate& plate, const MirroredMesh& mesh, const Patch& patch, const RestShape& rest);
     void setUpMirrored(Element& e, const MirroredMesh& mesh, const Patch& patch, const SecondDerivatives& rows);
     void assembleConstant(int vertexCount);

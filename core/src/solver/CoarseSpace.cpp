@@ -438,6 +438,8 @@ CoarseSpace::CoarseSpace(const CompactMatrix& matrix)
 }
 
 void CoarseSpace::findTargets(const CompactMatrix& matrix) {
+    m_target.reserve(matrix.rowEnd(matrix.size() - 1));
+    m_besideTarget.reserve(matrix.besideEnd(matrix.size() - 1));
     for (int row = 0; row < matrix.size(); ++row) {
         const int p = m_patchOf[row];
         for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k)

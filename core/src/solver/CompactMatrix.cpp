@@ -155,6 +155,8 @@ CompactMatrix::CompactMatrix(const BlockMatrix& matrix) : m_size(matrix.size()) 
     m_rowOf.resize(m_size);
     for (int row = 0; row < m_size; ++row) m_rowOf[m_vertexOf[row]] = row;
     m_rowStart.assign(1, 0);
+    m_column.reserve(2 * matrix.lower().size());
+    m_source.reserve(2 * matrix.lower().size());
     for (int row = 0; row < m_size; ++row) {
         const int i = m_vertexOf[row];
         const auto first = static_cast<std::ptrdiff_t>(m_column.size());
@@ -180,6 +182,8 @@ void CompactMatrix::takeBeside(const ConstantHessian* scalars) {
     m_besideColumn.clear();
     m_beside.clear();
     if (!scalars) return;
+    m_besideColumn.reserve(scalars->nonZeros());
+    m_beside.reserve(scalars->nonZeros());
     std::vector<std::pair<int, float>> entries;
     for (int row = 0; row < m_size; ++row) {
         entries.clear();
