@@ -22,8 +22,6 @@ constexpr double kMostGainOfFast = 0.1;    ///< the same where a body goes farth
 constexpr double kMostOvertaking = 3.0;    ///< of a shell that is pushed: its speed over the pushing body's
 constexpr double kMostEnergyGain = 1.0;    ///< of a step that is accepted as it is
 
-constexpr int kMostFactored = 600;  ///< vertices of a shell that is factored completely
-
 constexpr int kLeastForTeam = 1000;  ///< vertices of an island from which on threads pay
 
 /// Gives the time since the last call, by the caller's clock if there is one.
@@ -51,9 +49,14 @@ Vec3 contactArm(const IslandInput& input, const Contact& contact) {
 }
 
 /// Whether a shell is factored completely: incomplete factors know little of bending that spreads over several edges.
-bool isToBeFactored(const Shell& shell, double h) {
-    return shell.vertexCount() <= kMostFactored && shell.isStiff(h) &&
-           shell.settings().preconditioner == Preconditioner::IncompleteCholesky;
+/// Of larger shells, where it costs more, those over many (sheet metal, but no cloth) with bodies near them, whose
+/// contacts ask for more than bending in the air does.
+bool isToBeFactored(const Shell& shell, double h, bool isNearBodies) {
+    constexpr int kSmall = 600, kMost = 4000;  // vertices
+    constexpr double kEdges = 5.0;
+    const int n = shell.vertexCount();
+    if (n > kMost || shell.settings().preconditioner != Preconditioner::IncompleteCholesky) return false;
+    return n <= kSmall ? shell.isStiff(h) : isNearBodies && shell.bendingLength(h) > kEdges * shell.meanEdge();
 }
 
 /// By how much damping makes a mass harder to move.
@@ -74,6 +77,7 @@ struct IslandSolver::Impl {
     Points v, start, y;              ///< all shells
     Points from;                     ///< velocities that the step's momentum starts from (BDF2: not `start`)
     std::vector<double> stepOf;      ///< of each shell, as its integrator counts it [s]
+    std::vector<char> factored;      ///< shells: completely
     Points lastChange;               ///< dv of the last step
     Points expected;                 ///< velocities if that goes on: the warm start
     Points unfiltered;               ///< (b - A v) at the solution, soft rows included
@@ -129,9 +133,10 @@ StepReport IslandSolver::solve(const IslandInput& input) {
     s.impulseShare = 1.0;
     s.unsettled = false;
     s.times = {};
-    s.gather(input);  // one numbering for all shells
+    s.gather(input);
     LapTimer lap(input);
-    s.response.begin(input, {s.offsets, s.dynamicIndex, s.stepOf}, s.expected, s.y);  // contacts at the start, y
+    const ContactResponse::Numbering numbering{s.offsets, s.dynamicIndex, s.stepOf, s.factored};
+    s.response.begin(input, numbering, s.expected, s.y);  // contacts at the start, y
     lap.addTo(s.times.contact);
     s.solveStep(input, report);  // A, b; filtered PCG until the contacts agree
     report.times = s.times;
@@ -165,6 +170,9 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
     elasticAtStart.assign(input.shells.size(), std::numeric_limits<double>::quiet_NaN());
     for (std::size_t k = 0; k < input.shells.size(); ++k)
         if (input.bodies.empty()) beginTwoStep(input, k);
+    factored.clear();
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        factored.push_back(isToBeFactored(*input.shells[k], stepOf[k], !input.bodies.empty()));
     dynamicIndex.assign(input.bodies.size(), -1);
     dynamicBodies.clear();
     for (std::size_t b = 0; b < input.bodies.size(); ++b) {
@@ -471,12 +479,11 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
         const StepSystem& step = input.shells[k]->m_assembly->assemble(
             *input.shells[k], stepOf[k], input.gravity, input.wind, from.middleCols(offsets[k], n),
             y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr, team);
-        parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions(),
-                         isToBeFactored(*input.shells[k], stepOf[k])});
+        parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions(), factored[k] != 0});
     }
-    const bool isAnyStiff = std::any_of(parts.begin(), parts.end(), [](const auto& part) { return part.isStiff; });
+    const bool isAnyFactored = std::count(factored.begin(), factored.end(), 0) < std::ssize(factored);
     // Bodies that rest on the solution feel what single precision leaves over: soft rows and stacks lose their balance.
-    const bool isSingle = dynamicBodies.empty() && !isAnyStiff &&
+    const bool isSingle = dynamicBodies.empty() && !isAnyFactored &&
                           linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance &&
                           input.shells[0]->settings().preconditioner == Preconditioner::IncompleteCholesky;
     system.begin(std::move(parts), static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(),

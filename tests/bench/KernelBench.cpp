@@ -5,6 +5,7 @@
 #include "jacket/Shell.h"
 #include "solver/CompactShell.h"
 #include "solver/IncompleteCholesky.h"
+#include "solver/ShellFactor.h"
 
 namespace jacket {
 namespace {
@@ -85,6 +86,18 @@ void factorOrApply(benchmark::State& state, bool factorEach) {
 }
 BENCHMARK_CAPTURE(factorOrApply, factor, true)->Arg(31)->Arg(101);
 BENCHMARK_CAPTURE(factorOrApply, apply, false)->Arg(31)->Arg(101);
+
+void completeFactor(benchmark::State& state) {
+    const Shell sheet = swingingSheet(int(state.range(0)));
+    ShellAssembly assembly(sheet, designOf(sheet));
+    const Points y = Points::Zero(3, sheet.vertexCount());
+    const BlockMatrix& matrix = assembly.assemble(sheet, kStep, kGravity, nullptr, sheet.velocities(), y).matrix;
+    const std::vector<const Mat3*> free(sheet.vertexCount(), nullptr);
+    ShellFactor factor;
+    for (auto _ : state) benchmark::DoNotOptimize(factor.factor(matrix, matrix.diagonal(), matrix.lower(), free));
+    perVertex(state);
+}
+BENCHMARK(completeFactor)->Arg(13)->Arg(27)->Arg(35)->Arg(51)->Unit(benchmark::kMillisecond);
 
 /// What a solve in single precision is made of.
 enum class Compact { Take, Product, Factor, Apply, CoarseBuild, CoarseApply };

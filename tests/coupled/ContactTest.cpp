@@ -218,16 +218,16 @@ TEST(Contact, APlateThatIsHitInItsFirstStepGainsNoEnergy) {
 }
 
 /// A steel plate of 5 mm that falls flat on a box on the floor, in its first step or later.
-class PlateOnBox : public ::testing::TestWithParam<std::tuple<double, double, double, double>> {};
+class PlateOnBox : public ::testing::TestWithParam<std::tuple<double, double, double, double, int>> {};
 
 TEST_P(PlateOnBox, StopsThereAndLeavesTheBoxOnTheFloor) {
-    const auto [half, gap, speed, h] = GetParam();
+    const auto [half, gap, speed, h, cells] = GetParam();
     Scene scene;
     scene.addFloor();
     auto& box = scene.addBody(std::make_unique<btBoxShape>(btVector3(1, 1, 1) * btScalar(half)), 1.0,
                               btVector3(btScalar(0.003), btScalar(half), btScalar(-0.002)));
     scene.run(0.5, h);
-    TriangleMesh mesh = squareSheet(0.3, 6);
+    TriangleMesh mesh = squareSheet(0.3, cells);
     mesh.positions.row(1).array() += 2.0 * half + gap;
     auto& plate = scene.shells->add(mesh, materials::steel(5e-3));
     plate.setVelocity(btVector3(0, btScalar(-speed), 0));
@@ -242,7 +242,34 @@ TEST_P(PlateOnBox, StopsThereAndLeavesTheBoxOnTheFloor) {
 }
 INSTANTIATE_TEST_SUITE_P(Grid, PlateOnBox,
                          ::testing::Combine(::testing::Values(0.083, 0.117), ::testing::Values(0.02, 0.2),
-                                            ::testing::Values(2.0, 10.0), ::testing::Values(kStep, kStep / 4)));
+                                            ::testing::Values(2.0, 10.0), ::testing::Values(kStep, kStep / 4),
+                                            ::testing::Values(6)));
+INSTANTIATE_TEST_SUITE_P(Fine, PlateOnBox,  // a motion of the whole plate is one of many vertices
+                         ::testing::Combine(::testing::Values(0.083), ::testing::Values(0.02),
+                                            ::testing::Values(2.0, 10.0), ::testing::Values(kStep),
+                                            ::testing::Values(26)));
+
+/// Bending spreads over two edges in a step: not enough to be factored completely.
+TEST(Contact, AClothOfFineMeshGainsNoEnergyFromABox) {
+    constexpr double kHalf = 0.083, kGap = 0.02, kSpeed = 2.0;
+    Scene scene;
+    scene.addBody(std::make_unique<btBoxShape>(btVector3(1, 1, 1) * btScalar(kHalf)), 0.0,
+                  btVector3(btScalar(0.003), btScalar(kHalf), btScalar(-0.002)));
+    TriangleMesh mesh = squareSheet(0.3, 40);
+    mesh.positions.row(1).array() += 2.0 * kHalf + kGap;
+    ShellMaterial material;
+    material.stretchStiffnessOverride = 1e4;
+    material.bendingStiffnessOverride = 1e-4;
+    material.areaDensityOverride = 0.2;
+    auto& cloth = scene.shells->add(mesh, material);
+    cloth.setVelocity(btVector3(0, btScalar(-kSpeed), 0));
+    const double start = 0.5 * cloth.shell().masses().sum() * (kSpeed * kSpeed + 2.0 * 9.81 * (kGap + 2.0 * kHalf));
+    for (double t = 0.0; t < 0.3; t += kStep) {
+        scene.step(kStep);
+        const ShellEnergy energy = cloth.shell().energy();
+        ASSERT_LT(energy.kinetic + energy.membrane + energy.bending, start) << "at " << t << " s";
+    }
+}
 
 /// Moves a kinematic ball, by hand or by a motion state.
 class KinematicBall : public ::testing::TestWithParam<bool> {

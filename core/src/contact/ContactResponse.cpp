@@ -94,7 +94,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     if (!input.contacts) return;
 
     m_care = isAmongWalls() && !isAnyStiff() ? kAmongWalls : kInFull;
-    if (std::any_of(input.shells.begin(), input.shells.end(), [&](const Shell* s) { return s->isStiff(input.h); }))
+    if (std::count(numbering.factored.begin(), numbering.factored.end(), 0) < std::ssize(numbering.factored))
         m_care = kStiff;
     m_creep = creepSpeed();
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);

@@ -1,6 +1,5 @@
 #include "solver/CoarseSpace.h"
 
-#include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -97,136 +96,9 @@ std::vector<std::vector<int>> patchNeighbours(const CompactMatrix& matrix, const
 
 /// Patches numbered in an order of elimination with little fill.
 std::vector<int> orderPatches(const CompactMatrix& matrix, std::vector<int> patchOf) {
-    const auto neighbours = patchNeighbours(matrix, patchOf);
-    const int size = static_cast<int>(neighbours.size());
-    std::vector<Eigen::Triplet<double>> entries;
-    for (int i = 0; i < size; ++i) {
-        entries.emplace_back(i, i, 1.0);  // the ordering puts rows without a diagonal last, as if they were dense
-        for (const int j : neighbours[i]) entries.emplace_back(i, j, 1.0);
-    }
-    Eigen::SparseMatrix<double> pattern(size, size);
-    pattern.setFromTriplets(entries.begin(), entries.end());
-    Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
-    Eigen::AMDOrdering<int>()(pattern, order);
-    std::vector<int> place(size);
-    for (int k = 0; k < size; ++k) place[order.indices()[k]] = k;
+    const std::vector<int> place = eliminationOrder(patchNeighbours(matrix, patchOf));
     for (int& patch : patchOf) patch = place[patch];
     return patchOf;
-}
-
-/// Inverse of a symmetric positive semi-definite block, without the directions that have (almost) no stiffness left.
-JACKET_INLINE void invertBlock(const double* a, const double* original, double* inverse) {
-    constexpr int m = CoarseFactor::kModes;
-    constexpr double kLeast = 1e-9;  // of what the direction's stiffness was before the elimination
-    double l[m][m], root[m][m];      // root: D^-1/2 L^-1
-    double pivot[m];
-    for (int i = 0; i < m; ++i) {
-        for (int j = 0; j < i; ++j) {
-            double sum = a[m * j + i];
-            for (int k = 0; k < j; ++k) sum -= l[i][k] * l[j][k] * pivot[k];
-            l[i][j] = pivot[j] > 0.0 ? sum / pivot[j] : 0.0;
-        }
-        pivot[i] = a[m * i + i];
-        for (int k = 0; k < i; ++k) pivot[i] -= l[i][k] * l[i][k] * pivot[k];
-        if (!(pivot[i] > kLeast * original[i])) pivot[i] = 0.0;
-    }
-    for (int i = 0; i < m; ++i) {
-        for (int j = 0; j < m; ++j) {
-            root[i][j] = i == j ? 1.0 : 0.0;
-            for (int k = j; k < i; ++k) root[i][j] -= l[i][k] * root[k][j];
-        }
-    }
-    for (int i = 0; i < m; ++i)
-        for (int j = 0; j < m; ++j) {
-            double sum = 0.0;
-            for (int k = std::max(i, j); k < m; ++k)
-                if (pivot[k] > 0.0) sum += root[k][i] * root[k][j] / pivot[k];
-            inverse[m * j + i] = sum;
-        }
-}
-
-struct Elimination {
-    int size;
-    const int *columnStart, *row;
-    double *values, *inverse, *scaled;
-};
-
-/// c = a b
-JACKET_INLINE void multiplyBlocks(const double* a, const double* b, double* c) {
-    constexpr int m = CoarseFactor::kModes;
-    for (int column = 0; column < m; ++column) {
-        double sum[m] = {};
-        for (int k = 0; k < m; ++k)
-            for (int i = 0; i < m; ++i) sum[i] += a[m * k + i] * b[m * column + k];
-        for (int i = 0; i < m; ++i) c[m * column + i] = sum[i];
-    }
-}
-
-/// c -= a b^T
-JACKET_INLINE void subtractTransposed(const double* a, const double* b, double* c) {
-    constexpr int m = CoarseFactor::kModes;
-    for (int column = 0; column < m; ++column) {
-        double sum[m];
-        for (int i = 0; i < m; ++i) sum[i] = c[m * column + i];
-        for (int k = 0; k < m; ++k)
-            for (int i = 0; i < m; ++i) sum[i] -= a[m * k + i] * b[m * k + column];
-        for (int i = 0; i < m; ++i) c[m * column + i] = sum[i];
-    }
-}
-
-JACKET_KERNEL void eliminate(const Elimination& e) {
-    constexpr int m = CoarseFactor::kModes, size = CoarseFactor::kBlock;
-    double* lower = e.values + size * e.size;
-    for (int j = 0; j < e.size; ++j)  // the scaled blocks' memory holds what the pivots are measured against
-        for (int i = 0; i < m; ++i) e.inverse[size * j + i] = e.values[size * j + (m + 1) * i];
-    for (int j = 0; j < e.size; ++j) {
-        double original[m], *inverse = e.inverse + size * j;
-        for (int i = 0; i < m; ++i) original[i] = inverse[i];
-        invertBlock(e.values + size * j, original, inverse);
-        const int begin = e.columnStart[j], end = e.columnStart[j + 1];
-        for (int k = begin; k < end; ++k) multiplyBlocks(lower + size * k, inverse, e.scaled + size * (k - begin));
-        for (int k = begin; k < end; ++k) {
-            const int column = e.row[k];
-            const double* scaled = e.scaled + size * (k - begin);
-            subtractTransposed(lower + size * k, scaled, e.values + size * column);
-            int target = e.columnStart[column];
-            for (int below = k + 1; below < end; ++below) {
-                while (e.row[target] < e.row[below]) ++target;
-                subtractTransposed(lower + size * below, scaled, lower + size * target);
-            }
-        }
-        for (int k = size * begin; k < size * end; ++k) lower[k] = e.scaled[k - size * begin];
-    }
-}
-
-struct Substitution {
-    int size;
-    const int *columnStart, *row;
-    const double *lower, *inverse;
-};
-
-JACKET_KERNEL void substitute(const Substitution& s, double* x) {
-    constexpr int m = CoarseFactor::kModes, size = CoarseFactor::kBlock;
-    for (int j = 0; j < s.size; ++j)
-        for (int k = s.columnStart[j]; k < s.columnStart[j + 1]; ++k) {
-            const double *block = s.lower + size * k, *from = x + m * j;
-            double sum[m] = {}, *to = x + m * s.row[k];
-            for (int c = 0; c < m; ++c)
-                for (int i = 0; i < m; ++i) sum[i] += block[m * c + i] * from[c];
-            for (int i = 0; i < m; ++i) to[i] -= sum[i];
-        }
-    for (int j = s.size - 1; j >= 0; --j) {
-        double sum[m] = {};
-        const double* inverse = s.inverse + size * j;
-        for (int c = 0; c < m; ++c)
-            for (int i = 0; i < m; ++i) sum[i] += inverse[m * c + i] * x[m * j + c];
-        for (int k = s.columnStart[j]; k < s.columnStart[j + 1]; ++k) {
-            const double *block = s.lower + size * k, *from = x + m * s.row[k];
-            for (int i = 0; i < m; ++i)
-                for (int c = 0; c < m; ++c) sum[i] -= block[m * i + c] * from[c];
-        }
-        for (int i = 0; i < m; ++i) x[m * j + i] = sum[i];
-    }
 }
 
 constexpr int kSums = 48, kMoments = 16;  ///< numbers a block: see CoarseSpace::m_sums, m_moments
@@ -385,45 +257,6 @@ void addHeldRow(const Galerkin& g, int i, const std::vector<const Mat3*>& free) 
 
 }  // namespace
 
-CoarseFactor::CoarseFactor(const std::vector<std::vector<int>>& neighbours) : m_columnStart(1, 0) {
-    const int n = static_cast<int>(neighbours.size());
-    std::vector<std::vector<int>> columns(n), children(n);
-    std::vector<int> mark(n, -1);
-    std::size_t longest = 0;
-    for (int j = 0; j < n; ++j) {  // a column has its own blocks and those of the columns that are eliminated into it
-        const auto add = [&](int row) {
-            if (row <= j || mark[row] == j) return;
-            mark[row] = j;
-            columns[j].push_back(row);
-        };
-        for (const int i : neighbours[j]) add(i);
-        for (const int child : children[j])
-            for (const int row : columns[child]) add(row);
-        std::sort(columns[j].begin(), columns[j].end());
-        if (!columns[j].empty()) children[columns[j][0]].push_back(j);
-        m_row.insert(m_row.end(), columns[j].begin(), columns[j].end());
-        m_columnStart.push_back(static_cast<int>(m_row.size()));
-        longest = std::max(longest, columns[j].size());
-    }
-    m_values.assign(static_cast<std::size_t>(kBlock) * blockCount(), 0.0);
-    m_inverse.assign(static_cast<std::size_t>(kBlock) * n, 0.0);
-    m_scaled.assign(kBlock * longest, 0.0);
-}
-
-int CoarseFactor::index(int row, int column) const {
-    if (row <= column) return row == column ? row : -1;
-    const auto begin = m_row.begin() + m_columnStart[column], end = m_row.begin() + m_columnStart[column + 1];
-    return size() + static_cast<int>(std::lower_bound(begin, end, row) - m_row.begin());
-}
-
-void CoarseFactor::factor() {
-    eliminate({size(), m_columnStart.data(), m_row.data(), m_values.data(), m_inverse.data(), m_scaled.data()});
-}
-
-void CoarseFactor::solve(double* x) const {
-    substitute({size(), m_columnStart.data(), m_row.data(), m_values.data() + kBlock * size(), m_inverse.data()}, x);
-}
-
 CoarseSpace::CoarseSpace(const CompactMatrix& matrix)
     : m_patchOf(orderPatches(matrix, dividePatches(matrix))), m_factor(patchNeighbours(matrix, m_patchOf)) {
     m_patchStart.assign(patchCount() + 1, 0);
@@ -433,7 +266,7 @@ CoarseSpace::CoarseSpace(const CompactMatrix& matrix)
     std::vector<int> next(m_patchStart.begin(), m_patchStart.end() - 1);
     for (int row = 0; row < matrix.size(); ++row) m_members[next[m_patchOf[row]]++] = row;
     m_arms.resize(4 * matrix.size());
-    m_coarse.resize(CoarseFactor::kModes * patchCount());
+    m_coarse.resize(BlockFactor::kRows * patchCount());
     findTargets(matrix);
 }
 

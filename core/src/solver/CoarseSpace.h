@@ -4,34 +4,10 @@
 #include <vector>
 
 #include "jacket/Types.h"
+#include "solver/BlockFactor.h"
 #include "solver/CompactMatrix.h"
 
 namespace jacket {
-
-/// Block-sparse factor L D L^T of a symmetric positive semi-definite matrix of 6x6 blocks with a fixed pattern.
-class CoarseFactor {
-  public:
-    static constexpr int kModes = 6, kBlock = kModes * kModes;
-    /// `neighbours`: of each block row, in any order, without itself. Rows are eliminated as they are numbered.
-    explicit CoarseFactor(const std::vector<std::vector<int>>& neighbours);
-    int size() const { return static_cast<int>(m_columnStart.size()) - 1; }
-    int blockCount() const { return size() + static_cast<int>(m_row.size()); }
-    /// Index of block (row, column), row >= column, which must be in the pattern; -1 above the diagonal. Diagonal
-    /// blocks come first.
-    int index(int row, int column) const;
-    /// A block, 36 numbers by columns, to be filled before every `factor`.
-    double* block(int index) { return m_values.data() + kBlock * index; }
-    const double* block(int index) const { return m_values.data() + kBlock * index; }
-    /// In place. Directions without stiffness are left out: the factor's inverse is zero there.
-    void factor();
-    /// x = (L D L^T)^-1 x, six numbers a block row.
-    void solve(double* x) const;
-
-  private:
-    std::vector<int> m_columnStart, m_row;  ///< strictly lower blocks by columns
-    std::vector<double> m_values;           ///< diagonal blocks, then those
-    std::vector<double> m_inverse, m_scaled;
-};
 
 /// The rigid motions of patches of a shell: what a factor without fill does not see. P^T A P is formed for the matrix
 /// and the constraints of a step, with rotations about the vertices' present places, and factored.
@@ -65,7 +41,7 @@ class CoarseSpace {
     void collect(double besideFactor, int begin, int end);
     std::vector<int> m_patchOf;                ///< of each row; patches are numbered as they are eliminated
     std::vector<int> m_patchStart, m_members;  ///< rows of each patch
-    CoarseFactor m_factor;
+    BlockFactor m_factor;
     std::vector<int> m_target;         ///< factor's block of each block of the matrix; -1: its mirror image has it
     std::vector<int> m_besideTarget;   ///< the same of each scalar
     std::vector<char> m_isHeld;        ///< rows with a projector

@@ -82,7 +82,7 @@ class CoupledSystem {
         const Points* rhs;
         int offset;                         ///< first vertex in the island's numbering
         const Points* positions = nullptr;  ///< for a coarse space; null: without
-        bool isStiff = false;               ///< small, and stiff for its mesh: to be factored completely
+        bool isStiff = false;               ///< for its mesh: to be factored completely
     };
 
     /// `couplings`: off-diagonal blocks of the mass, between dynamic bodies by their index here. `team` may help with

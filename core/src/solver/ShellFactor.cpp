@@ -3,86 +3,140 @@
 #include <algorithm>
 
 namespace jacket {
+namespace {
+
+constexpr double kLeast = 1e-14;  ///< of a direction's stiffness: less left over is rounding
+
+using Neighbours = std::vector<std::vector<int>>;
+
+/// Calls `visit(i, j)`, i > j, for what stands beside the blocks of a matrix.
+void forBeside(const BlockMatrix& matrix, const auto& visit) {
+    if (!matrix.beside()) return;
+    for (int i = 0; i < matrix.size(); ++i)
+        for (ConstantHessian::InnerIterator entry(*matrix.beside(), i); entry; ++entry)
+            if (entry.col() < i) visit(i, static_cast<int>(entry.col()), entry.value());
+}
+
+/// Calls `visit(i, j, k)`, i > j, for block k of a matrix.
+void forLower(const BlockMatrix& matrix, const auto& visit) {
+    for (int i = 0; i < matrix.size(); ++i)
+        for (int k = matrix.rowBegin(i); k < matrix.rowEnd(i); ++k) visit(i, matrix.column(k), k);
+}
+
+/// A number for every vertex, the same for two that share a block of the matrix; each of the two has the fewest others
+/// to go with. A few are left alone.
+std::vector<int> pairUp(const BlockMatrix& matrix) {
+    const int n = matrix.size();
+    Neighbours neighbours(n);
+    forLower(matrix, [&](int i, int j, int) {
+        neighbours[i].push_back(j);
+        neighbours[j].push_back(i);
+    });
+    std::vector<int> pairOf(n, -1), open(n);
+    for (int i = 0; i < n; ++i) open[i] = static_cast<int>(neighbours[i].size());
+    int pairs = 0;
+    for (int i = 0; i < n; ++i) {
+        if (pairOf[i] >= 0) continue;
+        int mate = i;
+        for (const int j : neighbours[i])
+            if (pairOf[j] < 0 && (mate == i || open[j] < open[mate])) mate = j;
+        for (const int taken : {i, mate}) {
+            pairOf[taken] = pairs;
+            for (const int j : neighbours[taken]) --open[j];
+        }
+        ++pairs;
+    }
+    return pairOf;
+}
+
+}  // namespace
+
+/// Another matrix may stand where one was; of the same size, it is one of the same mesh.
+bool ShellFactor::isOf(const BlockMatrix& matrix) const {
+    const auto entries = matrix.beside() ? matrix.beside()->nonZeros() : 0;
+    return m_pattern == &matrix && m_beside == matrix.beside() && m_besideCount == entries &&
+           m_slot.size() == matrix.diagonal().size() && m_lowerPlace.size() == matrix.lower().size();
+}
 
 /// The pattern never changes, so that the elimination is ordered once.
 void ShellFactor::analyse(const BlockMatrix& matrix) {
-    const int n = matrix.size();
-    std::vector<std::vector<int>> rows(n);
-    for (int i = 0; i < n; ++i) {
-        rows[i].push_back(i);
-        for (int k = matrix.rowBegin(i); k < matrix.rowEnd(i); ++k) rows[matrix.column(k)].push_back(i);
-    }
-    if (const ConstantHessian* beside = matrix.beside())
-        for (int i = 0; i < n; ++i)
-            for (ConstantHessian::InnerIterator entry(*beside, i); entry; ++entry)
-                if (entry.col() < i) rows[entry.col()].push_back(i);
-    m_columnStart.assign(1, 0);
-    m_row.clear();
-    for (auto& column : rows) {
-        std::sort(column.begin(), column.end());
-        column.erase(std::unique(column.begin(), column.end()), column.end());
-        m_row.insert(m_row.end(), column.begin(), column.end());
-        m_columnStart.push_back(static_cast<int>(m_row.size()));
-    }
-    m_lowerSlot.resize(matrix.lower().size());
-    for (int i = 0; i < n; ++i)
-        for (int k = matrix.rowBegin(i); k < matrix.rowEnd(i); ++k) m_lowerSlot[k] = slot(i, matrix.column(k));
-    m_blocks.assign(m_row.size(), Mat3::Zero());
     m_pattern = &matrix;
     m_beside = matrix.beside();
-    expand();
-    m_factor.analyzePattern(m_matrix);
-}
-
-int ShellFactor::slot(int row, int column) const {
-    const auto first = m_row.begin() + m_columnStart[column], last = m_row.begin() + m_columnStart[column + 1];
-    return static_cast<int>(std::lower_bound(first, last, row) - m_row.begin());
-}
-
-/// Blocks to scalars, on and below the diagonal.
-void ShellFactor::expand() {
-    const int n = static_cast<int>(m_columnStart.size()) - 1;
-    const bool isNew = m_matrix.cols() != 3 * n;
-    if (isNew) {
-        m_matrix.resize(3 * n, 3 * n);
-        m_matrix.resizeNonZeros(static_cast<Eigen::Index>(9 * m_row.size() - 3 * static_cast<std::size_t>(n)));
+    m_besideCount = m_beside ? m_beside->nonZeros() : 0;
+    const std::vector<int> pairOf = pairUp(matrix);
+    const int pairs = 1 + *std::max_element(pairOf.begin(), pairOf.end());
+    Neighbours neighbours(pairs), ordered(pairs);
+    const auto join = [&](int i, int j, auto) {
+        const int a = pairOf[i], b = pairOf[j];
+        if (a == b) return;
+        neighbours[a].push_back(b);
+        neighbours[b].push_back(a);
+    };
+    forLower(matrix, join);
+    forBeside(matrix, join);
+    for (auto& list : neighbours) {
+        std::sort(list.begin(), list.end());
+        list.erase(std::unique(list.begin(), list.end()), list.end());
     }
-    int next = 0;
-    for (int column = 0; column < n; ++column)
-        for (int c = 0; c < 3; ++c) {
-            m_matrix.outerIndexPtr()[3 * column + c] = next;
-            for (int k = m_columnStart[column]; k < m_columnStart[column + 1]; ++k)
-                for (int r = m_row[k] == column ? c : 0; r < 3; ++r, ++next) {
-                    m_matrix.innerIndexPtr()[next] = 3 * m_row[k] + r;
-                    m_matrix.valuePtr()[next] = m_blocks[k](r, c);
-                }
-        }
-    m_matrix.outerIndexPtr()[3 * n] = next;
+    const std::vector<int> order = eliminationOrder(neighbours);
+    for (int a = 0; a < pairs; ++a)
+        for (const int b : neighbours[a]) ordered[order[a]].push_back(order[b]);
+    m_factor.emplace(ordered);
+    m_x.assign(static_cast<std::size_t>(BlockFactor::kRows) * pairs, 0.0);
+
+    std::vector<int> taken(pairs, 0);
+    m_slot.clear();
+    for (const int pair : pairOf) m_slot.push_back(2 * order[pair] + taken[pair]++);
+    m_free.clear();
+    for (int pair = 0; pair < pairs; ++pair)
+        if (taken[pair] < 2) m_free.push_back(2 * order[pair] + 1);
+    m_lowerPlace.clear();
+    m_besidePlace.clear();
+    forLower(matrix, [&](int i, int j, int) { m_lowerPlace.push_back(placeOf(i, j)); });
+    forBeside(matrix, [&](int i, int j, double) { m_besidePlace.push_back(placeOf(i, j)); });
+}
+
+int ShellFactor::placeOf(int i, int j) const {
+    int row = m_slot[i], column = m_slot[j];
+    const bool isTransposed = row < column;
+    if (isTransposed) std::swap(row, column);
+    const int place = BlockFactor::kSize * m_factor->index(row / 2, column / 2) +
+                      3 * BlockFactor::kRows * (column % 2) + 3 * (row % 2);
+    return isTransposed ? ~place : place;
+}
+
+void ShellFactor::add(int place, const Mat3& block) {
+    using Part = Eigen::Map<Mat3, Eigen::Unaligned, Eigen::OuterStride<BlockFactor::kRows>>;
+    double* const values = m_factor->block(0);
+    if (place >= 0)
+        Part(values + place) += block;
+    else
+        Part(values + ~place) += block.transpose();
 }
 
 bool ShellFactor::factor(const BlockMatrix& matrix, const std::vector<Mat3>& diagonal, const std::vector<Mat3>& lower,
                          const std::vector<const Mat3*>& free) {
-    if (m_pattern != &matrix || m_beside != matrix.beside()) analyse(matrix);
-    std::fill(m_blocks.begin(), m_blocks.end(), Mat3::Zero());
-    for (int i = 0; i < matrix.size(); ++i) m_blocks[m_columnStart[i]] = diagonal[i];
-    for (std::size_t k = 0; k < lower.size(); ++k) m_blocks[m_lowerSlot[k]] += lower[k];
-    for (int i = 0; m_beside && i < matrix.size(); ++i)
-        for (ConstantHessian::InnerIterator entry(*m_beside, i); entry; ++entry) {
-            const int j = static_cast<int>(entry.col());
-            if (j > i) continue;
-            Mat3 block = matrix.besideFactor() * entry.value() * Mat3::Identity();
-            if (free[i]) block = *free[i] * block;
-            if (free[j]) block = block * *free[j];
-            m_blocks[slot(i, j)] += block;
-        }
-    expand();
-    m_factor.factorize(m_matrix);
-    return m_factor.info() == Eigen::Success && (m_factor.vectorD().array() > 0.0).all();
+    if (!isOf(matrix)) analyse(matrix);
+    m_factor->setZero();
+    for (int i = 0; i < matrix.size(); ++i) add(placeOf(i, i), diagonal[i]);
+    for (std::size_t k = 0; k < lower.size(); ++k) add(m_lowerPlace[k], lower[k]);
+    auto place = m_besidePlace.begin();
+    forBeside(matrix, [&](int i, int j, double value) {
+        Mat3 block = matrix.besideFactor() * value * Mat3::Identity();
+        if (free[i]) block = *free[i] * block;
+        if (free[j]) block = block * *free[j];
+        add(*place++, block);
+    });
+    for (const int slot : m_free) Eigen::Map<Mat6>(m_factor->block(slot / 2)).diagonal().tail<3>().setOnes();
+    return m_factor->factor(kLeast);
 }
 
 void ShellFactor::apply(const double* r, double* z) const {
-    const Eigen::Index size = m_matrix.cols();
-    Eigen::Map<Eigen::VectorXd>(z, size) = m_factor.solve(Eigen::Map<const Eigen::VectorXd>(r, size));
+    const int n = static_cast<int>(m_slot.size());
+    for (int i = 0; i < n; ++i) Eigen::Map<Vec3>(m_x.data() + 3 * m_slot[i]) = Eigen::Map<const Vec3>(r + 3 * i);
+    for (const int slot : m_free) Eigen::Map<Vec3>(m_x.data() + 3 * slot).setZero();
+    m_factor->solve(m_x.data());
+    for (int i = 0; i < n; ++i) Eigen::Map<Vec3>(z + 3 * i) = Eigen::Map<const Vec3>(m_x.data() + 3 * m_slot[i]);
 }
 
 }  // namespace jacket

@@ -1,15 +1,15 @@
 #pragma once
-#include <Eigen/SparseCholesky>
-
+#include <optional>
 #include <vector>
 
+#include "solver/BlockFactor.h"
 #include "solver/BlockMatrix.h"
 
 namespace jacket {
 
-/// Complete Cholesky factor of one shell's filtered matrix, with what stands beside its blocks. For small shells that
-/// are stiff for their mesh, where incomplete factors know so little of bending that iterations end far from the
-/// solution.
+/// Complete Cholesky factor of one shell's filtered matrix, with what stands beside its blocks. For shells that are
+/// stiff for their mesh, where incomplete factors know so little of bending that iterations end far from the solution.
+/// Vertices are eliminated two at a time: blocks of six rows keep a processor busy.
 class ShellFactor {
   public:
     /// `diagonal` and `lower` are the filtered values, on the pattern of `matrix`; `free`: of each vertex the projector
@@ -20,18 +20,20 @@ class ShellFactor {
     void apply(const double* r, double* z) const;
 
   private:
-    using Sparse = Eigen::SparseMatrix<double>;
+    bool isOf(const BlockMatrix& matrix) const;
     void analyse(const BlockMatrix& matrix);
-    int slot(int row, int column) const;
-    void expand();
+    int placeOf(int i, int j) const;
+    void add(int place, const Mat3& block);
 
     const BlockMatrix* m_pattern = nullptr;
     const ConstantHessian* m_beside = nullptr;
-    std::vector<int> m_columnStart, m_row;  ///< blocks on and below the diagonal, by columns
-    std::vector<int> m_lowerSlot;           ///< of each block of the matrix
-    std::vector<Mat3> m_blocks;
-    Sparse m_matrix;
-    Eigen::SimplicialLDLT<Sparse> m_factor;
+    Eigen::Index m_besideCount = 0;
+    std::vector<int> m_slot;  ///< of each vertex: half block rows
+    std::vector<int> m_free;  ///< half block rows of no vertex
+    /// Where the factor keeps a block of the matrix, or one that stands beside it below the diagonal; ~: its transpose.
+    std::vector<int> m_lowerPlace, m_besidePlace;
+    std::optional<BlockFactor> m_factor;
+    mutable std::vector<double> m_x;  ///< in the factor's order
 };
 
 }  // namespace jacket
