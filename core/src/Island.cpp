@@ -23,6 +23,7 @@ constexpr double kMostOvertaking = 3.0;    ///< of a shell that is pushed: its s
 constexpr double kMostEnergyGain = 1.0;    ///< of a step that is accepted as it is
 
 constexpr int kLeastForTeam = 1000;  ///< vertices of an island from which on threads pay
+constexpr int kLeastCompact = 200;   ///< vertices of a shell from which on a coarse space pays in double precision
 
 /// Gives the time since the last call, by the caller's clock if there is one.
 class LapTimer {
@@ -472,6 +473,7 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
 void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
     LapTimer lap(input);
     WorkerTeam* const team = start.cols() < kLeastForTeam ? nullptr : input.team;
+    const bool isIncomplete = input.shells[0]->settings().preconditioner == Preconditioner::IncompleteCholesky;
     std::vector<CoupledSystem::ShellPart> parts;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const int n = input.shells[k]->vertexCount();
@@ -479,13 +481,13 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
         const StepSystem& step = input.shells[k]->m_assembly->assemble(
             *input.shells[k], stepOf[k], input.gravity, input.wind, from.middleCols(offsets[k], n),
             y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr, team);
-        parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions(), factored[k] != 0});
+        parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions(), factored[k] != 0,
+                         isIncomplete && !factored[k] && n >= kLeastCompact});
     }
     const bool isAnyFactored = std::count(factored.begin(), factored.end(), 0) < std::ssize(factored);
     // Bodies that rest on the solution feel what single precision leaves over: soft rows and stacks lose their balance.
     const bool isSingle = dynamicBodies.empty() && !isAnyFactored &&
-                          linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance &&
-                          input.shells[0]->settings().preconditioner == Preconditioner::IncompleteCholesky;
+                          linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance && isIncomplete;
     system.begin(std::move(parts), static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(),
                  supports.couplings(), isSingle ? Precision::Single : Precision::Double, isSingle ? team : nullptr);
     readFreeTwists();

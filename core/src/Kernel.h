@@ -18,6 +18,9 @@ namespace jacket {
 /// Four floats that are computed with at once, by a vector extension that GCC and Clang have for every machine.
 using Float4 = float __attribute__((vector_size(16)));
 
+/// The same of doubles. Not for results of functions: machines differ in how these are handed back.
+using Double4 = double __attribute__((vector_size(32)));
+
 JACKET_INLINE Float4 load4(const float* from) {
     Float4 result;
     std::memcpy(&result, from, sizeof(result));

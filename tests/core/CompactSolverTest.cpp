@@ -371,10 +371,15 @@ struct Solved {
     Points v, unfiltered;
 };
 
-Solved solve(const SheetMatrix& m, Precision precision, double tolerance, bool withPositions = true) {
+Solved solve(const SheetMatrix& m, Precision precision, double tolerance, bool withPositions = true,
+             bool isCompact = false) {
     CoupledSystem system;
-    system.begin({{&m.step.matrix, &m.step.rhs, 0, withPositions ? &m.sheet.positions() : nullptr}}, m.size(), {}, {},
-                 {}, precision);
+    system.begin({{.matrix = &m.step.matrix,
+                   .rhs = &m.step.rhs,
+                   .offset = 0,
+                   .positions = withPositions ? &m.sheet.positions() : nullptr,
+                   .isCompact = isCompact}},
+                 m.size(), {}, {}, {}, precision);
     std::vector<VertexConstraint> pins;
     for (int i = 0; i < m.size(); ++i)
         if (m.sheet.isPinned(i)) pins.push_back({.vertex = i});
@@ -403,6 +408,16 @@ TEST(CompactSolveTest, VelocitiesEqualThoseOfTheDoubleSolve) {
         EXPECT_LE(single.report.residual, tolerance);
         EXPECT_LT((single.v - expected.v).norm(), 10.0 * tolerance * change.norm());
     }
+}
+
+TEST(CompactSolveTest, PreconditionsSolvesInDoubleToo) {
+    const SheetMatrix m(61);
+    const Solved expected = solve(m, Precision::Double, 1e-9);
+    const Solved solved = solve(m, Precision::Double, 1e-9, true, true);
+    EXPECT_TRUE(solved.report.converged);
+    EXPECT_LT(2 * solved.report.iterations, expected.report.iterations);
+    const Points change = expected.v - m.sheet.velocities();
+    EXPECT_LT((solved.v - expected.v).norm(), 1e-7 * change.norm());
 }
 
 /// The residual is that of the double system at the end, exact to rounding in double: bodies and the ledger of momentum

@@ -590,6 +590,18 @@ TEST(FilteredPcgTest, CompleteFactorsNeedOneIteration) {
     }
 }
 
+/// Rounding in the preconditioner does not end up in the solution.
+TEST(FilteredPcgTest, CompactFactorsServeBodiesRowsAndFriction) {
+    Island island(14, {13, 8}, 2);
+    std::vector<CoupledSystem::ShellPart> parts(island.system.shells().begin(), island.system.shells().end());
+    for (auto& part : parts) part.isCompact = true;
+    island.system.begin(parts, 21, island.system.mass(), island.system.freeTwist());
+    makeBusy(island, 3.0);
+    const Solved solved = solve(island.system, Preconditioner::IncompleteCholesky, 1e-10);
+    EXPECT_TRUE(solved.report.converged);
+    EXPECT_LT(test::relativeError(solved.x(), DenseIsland(island.system).solve()), 1e-8);
+}
+
 TEST(FilteredPcgTest, LightAndHeavyBodiesEqualDense) {
     for (const double ratio : {1e-3, 1e3}) {
         Island island(15, {16}, 1);

@@ -3,9 +3,44 @@
 #include <algorithm>
 #include <cassert>
 
+#include "Kernel.h"
 #include "solver/CompactShell.h"
 
 namespace jacket {
+namespace {
+
+/// Scalars by rows, and what they are multiplied with, in fours.
+struct ScalarRows {
+    const int *start, *column;
+    const double *value, *x;
+    double factor;
+    int count;
+};
+
+/// y += factor K x, three numbers a row of y.
+JACKET_KERNEL void addScalarRows(const ScalarRows& scalars, double* y) {
+    const ScalarRows rows = scalars;  // nobody writes there
+    for (int i = 0; i < rows.count; ++i) {
+        Double4 even{}, odd{};  // two sums: shorter chains of additions
+        int k = rows.start[i];
+        const int end = rows.start[i + 1];
+        Double4 x;
+        for (; k + 1 < end; k += 2) {
+            std::memcpy(&x, rows.x + 4 * rows.column[k], sizeof(x));
+            even += rows.value[k] * x;
+            std::memcpy(&x, rows.x + 4 * rows.column[k + 1], sizeof(x));
+            odd += rows.value[k + 1] * x;
+        }
+        if (k < end) {
+            std::memcpy(&x, rows.x + 4 * rows.column[k], sizeof(x));
+            even += rows.value[k] * x;
+        }
+        even = rows.factor * (even + odd);
+        for (int c = 0; c < 3; ++c) y[3 * i + c] += even[c];
+    }
+}
+
+}  // namespace
 
 BlockMatrix::BlockMatrix() = default;
 BlockMatrix::~BlockMatrix() = default;
@@ -81,21 +116,11 @@ void BlockMatrix::multiply(const double* x, double* y) const {
 }
 
 void BlockMatrix::addBeside(const double* x, double* y) const {
-    const int* start = m_beside->outerIndexPtr();
-    const int* column = m_beside->innerIndexPtr();
-    const double* value = m_beside->valuePtr();
-    for (int i = 0; i < size(); ++i) {
-        double y0 = 0.0, y1 = 0.0, y2 = 0.0;
-        for (int k = start[i]; k < start[i + 1]; ++k) {
-            const double* xj = x + 3 * column[k];
-            y0 += value[k] * xj[0];
-            y1 += value[k] * xj[1];
-            y2 += value[k] * xj[2];
-        }
-        y[3 * i] += m_besideFactor * y0;
-        y[3 * i + 1] += m_besideFactor * y1;
-        y[3 * i + 2] += m_besideFactor * y2;
-    }
+    m_padded.resize(4 * static_cast<std::size_t>(size()));
+    for (int i = 0; i < size(); ++i) std::copy_n(x + 3 * i, 3, m_padded.data() + 4 * i);
+    addScalarRows({m_beside->outerIndexPtr(), m_beside->innerIndexPtr(), m_beside->valuePtr(), m_padded.data(),
+                   m_besideFactor, size()},
+                  y);
 }
 
 }  // namespace jacket

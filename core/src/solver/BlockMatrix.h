@@ -62,6 +62,7 @@ class BlockMatrix {
     std::vector<Mat3> m_diagonal, m_lower;
     const ConstantHessian* m_beside = nullptr;
     double m_besideFactor = 0.0;
+    mutable std::vector<double> m_padded;  ///< a vector in fours, for the machine's sake
     mutable std::unique_ptr<CompactShell> m_compact;
 };
 

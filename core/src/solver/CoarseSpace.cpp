@@ -13,8 +13,6 @@ constexpr int kPatchSize = 64;                             ///< vertices
 constexpr int kAhead = 4;                                  ///< rows between prefetch and use
 constexpr int kPatchesAtATime = 16, kBlocksAtATime = 128;  ///< that a thread of a team takes
 
-using Double4 = double __attribute__((vector_size(32)));
-
 /// Steps along blocks from `start` to each of `rows`, whose `inside` is set; parts without a way to it come after.
 void measureDistances(const CompactMatrix& matrix, const std::vector<int>& rows, const std::vector<char>& inside,
                       int start, std::vector<int>& distance, std::vector<int>& queue) {

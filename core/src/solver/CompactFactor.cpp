@@ -9,8 +9,6 @@
 namespace jacket {
 namespace {
 
-using Double4 = double __attribute__((vector_size(32)));
-
 /// What a factor is made of, as plain memory for the kernels. Blocks are nine numbers by columns.
 struct Factoring {
     const int *vertexOf, *rowStart, *column, *source, *pairStart, *pairs, *upperOf;

@@ -40,12 +40,12 @@ void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t 
         m_lower.clear();
     addRows(system, part);
     filterBlocks(system, part);
-    if (system.precision() == Precision::Single) {
+    if (system.precision() == Precision::Double && factorCompletely(system, shell)) return;
+    if (isCompact(system, shell)) {
         part.matrix->compact().factor.factor(m_diagonal, m_lower, system.team());
         buildCoarse(system, part);
         return;
     }
-    if (factorCompletely(system, shell)) return;
     if (kind == Preconditioner::IncompleteCholesky) {
         m_factors[shell].factor(*part.matrix, m_diagonal, m_lower);
     } else {
@@ -95,6 +95,10 @@ void CoupledPreconditioner::buildCoarse(const CoupledSystem& system, const Coupl
         m_ties.push_back(tie);
     }
     compact.coarse->build(compact.matrix, *part.positions, m_free, m_ties, system.team());
+}
+
+bool CoupledPreconditioner::isCompact(const CoupledSystem& system, std::size_t shell) const {
+    return system.precision() == Precision::Single || (system.shells()[shell].isCompact && !m_complete[shell]);
 }
 
 bool CoupledPreconditioner::isCoarse(const CoupledSystem& system) const {
@@ -227,11 +231,28 @@ void CoupledPreconditioner::factorGroups(const CoupledSystem& system, const std:
     }
 }
 
+/// In single precision what is computed with in double: iterations need to know P no better.
+void CoupledPreconditioner::applyCompact(const CoupledSystem::ShellPart& part, const Points& r, Points& z) const {
+    const CompactShell& compact = part.matrix->compact();
+    const std::vector<int>& vertexOf = compact.matrix.vertexOf();
+    m_rounded.resize(4 * vertexOf.size());
+    m_roundedZ.resize(4 * vertexOf.size());
+    for (std::size_t row = 0; row < vertexOf.size(); ++row)
+        Eigen::Map<Eigen::Vector4f>(m_rounded.data() + 4 * row) << r.col(part.offset + vertexOf[row]).cast<float>(),
+            0.0f;
+    compact.precondition(m_rounded.data(), m_roundedZ.data(), nullptr);
+    for (std::size_t row = 0; row < vertexOf.size(); ++row)
+        z.col(part.offset + vertexOf[row]) =
+            Eigen::Map<const Eigen::Vector3f>(m_roundedZ.data() + 4 * row).cast<double>();
+}
+
 void CoupledPreconditioner::apply(const CoupledSystem& system, const CoupledVector& r, CoupledVector& z) const {
     for (std::size_t i = 0; i < system.shells().size(); ++i) {
         const auto& part = system.shells()[i];
         if (m_complete[i]) {
             m_complete[i]->apply(r.s.data() + 3 * part.offset, z.s.data() + 3 * part.offset);
+        } else if (isCompact(system, i)) {
+            applyCompact(part, r.s, z.s);
         } else if (m_kind == Preconditioner::IncompleteCholesky) {
             m_factors[i].apply(r.s.data() + 3 * part.offset, z.s.data() + 3 * part.offset);
         } else {

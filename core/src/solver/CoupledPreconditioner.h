@@ -26,8 +26,8 @@ class CoupledPreconditioner {
     /// The same, of a system in single precision, which is always factored: with an incomplete factor and, where the
     /// shell is large and its positions are known, a coarse space.
     void apply(const CoupledSystem& system, const CompactVector& r, CompactVector& z) const;
-    /// Whether every shell has a coarse space: r^T P^-1 r then weighs rigid motions of parts as the others. Without, it
-    /// makes little of them.
+    /// Whether this is of a system in single precision, and every shell has a coarse space: r^T P^-1 r then weighs
+    /// rigid motions of parts as the others. Without, it makes little of them.
     bool isCoarse(const CoupledSystem& system) const;
     /// Whether some shell is factored completely.
     bool isComplete() const;
@@ -35,6 +35,9 @@ class CoupledPreconditioner {
   private:
     void buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind);
     bool factorCompletely(const CoupledSystem& system, std::size_t shell);
+    bool isCompact(const CoupledSystem& system, std::size_t shell) const;
+    /// What the other apply does to a system in single precision, of one shell of a system in double.
+    void applyCompact(const CoupledSystem::ShellPart& part, const Points& r, Points& z) const;
     void findFree(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
     void buildCoarse(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
     void eliminateShells(const CoupledSystem& system);
@@ -51,9 +54,10 @@ class CoupledPreconditioner {
         Eigen::LDLT<Eigen::MatrixXd> factor;
     };
 
-    std::vector<Mat3> m_diagonal, m_lower;  ///< scratch: filtered copy of one shell's matrix
-    std::vector<const Mat3*> m_free;        ///< scratch
-    std::vector<CoarseSpace::Tie> m_ties;   ///< scratch
+    std::vector<Mat3> m_diagonal, m_lower;             ///< scratch: filtered copy of one shell's matrix
+    std::vector<const Mat3*> m_free;                   ///< scratch
+    std::vector<CoarseSpace::Tie> m_ties;              ///< scratch
+    mutable std::vector<float> m_rounded, m_roundedZ;  ///< scratch: a shell's r and z, four floats a row
     std::vector<IncompleteCholesky> m_factors;
     std::vector<std::unique_ptr<ShellFactor>> m_complete;  ///< of each shell; null: not factored completely
     std::vector<CoupledVector> m_columns, m_solved;        ///< shells' part of the bodies' columns, and A^-1 of it

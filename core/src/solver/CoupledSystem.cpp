@@ -50,9 +50,9 @@ void CoupledSystem::begin(std::vector<ShellPart> shells, int vertexCount, std::v
     m_rows.clear();
     m_precision = precision;
     m_team = team;
-    if (precision == Precision::Double) return;
     m_compactPlaces.resize(vertexCount);
     for (const auto& shell : m_shells) {
+        if (precision == Precision::Double && !shell.isCompact) continue;
         CompactShell& compact = shell.matrix->compact();
         if (compact.matrix.setValues(*shell.matrix, m_team)) compact.coarse.reset();
         for (int i = 0; i < shell.matrix->size(); ++i)

@@ -83,6 +83,7 @@ class CoupledSystem {
         int offset;                         ///< first vertex in the island's numbering
         const Points* positions = nullptr;  ///< for a coarse space; null: without
         bool isStiff = false;               ///< for its mesh: to be factored completely
+        bool isCompact = false;             ///< preconditioned in single precision, with a coarse space, in any case
     };
 
     /// `couplings`: off-diagonal blocks of the mass, between dynamic bodies by their index here. `team` may help with

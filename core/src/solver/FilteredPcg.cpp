@@ -11,8 +11,6 @@ namespace {
 
 constexpr int kFloatsAtATime = 8192;  ///< that a thread of a team takes: a multiple of four
 
-using Double4 = double __attribute__((vector_size(32)));
-
 JACKET_KERNEL double dotKernel(std::size_t size, const float* a, const float* b) {
     Double4 sum{};
     for (std::size_t i = 0; i < size; i += 4)
@@ -119,7 +117,7 @@ double FilteredPcg::iterate(const CoupledSystem& system, const CoupledPreconditi
         m_r.addScaled(-alpha, m_q);
         preconditioner.apply(system, m_r, m_z);
         const double next = m_r.dot(m_z);
-        m_d.scaleAndAdd(next / rho, m_z);
+        m_d.scaleAndAdd(-alpha * m_z.dot(m_q) / rho, m_z);  // next / rho, but for a P that is not quite symmetric
         rho = next;
         ++iterations;
     }
