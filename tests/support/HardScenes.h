@@ -147,4 +147,34 @@ struct StackScene : BulletScene {
     std::vector<btRigidBody*> boxes;
 };
 
+/// A ball of 2 kg in a sheet that is pinned at its border. Without `angularDamping` (see btRigidBody::setDamping)
+/// nothing but the sheet takes the energy with which it rolls to and fro.
+struct RestingBall {
+    static constexpr double kStep = 1.0 / 60, kWeight = 2.0 * 9.81;
+
+    BulletScene scene;
+    btRigidBody& ball;
+    ShellBody& sheet;
+
+    explicit RestingBall(int cells, double angularDamping = 0.0)
+        : ball(scene.addSphere(0.25, 2.0, btVector3(0, btScalar(0.26), 0))),
+          sheet(scene.shells->add(squareSheet(2, cells), cloth(), {.sleeping = false})) {
+        ball.setActivationState(DISABLE_DEACTIVATION);
+        ball.setDamping(0, btScalar(angularDamping));
+        pinBorder(sheet);
+        scene.run(10.0, kStep);
+    }
+    static ShellMaterial cloth() {
+        ShellMaterial m = trampolineCloth();
+        m.massDamping = 5.0;
+        return m;
+    }
+    /// One step; what the sheet bears of the ball in it over the ball's weight, less 1.
+    double step() {
+        scene.step(kStep);
+        return jacket::testing::contactImpulse(sheet, ball).y() / kStep / kWeight - 1.0;
+    }
+    Vec3 position() const { return toVec3(ball.getWorldTransform().getOrigin()); }
+};
+
 }  // namespace jacket::bullet::testing
