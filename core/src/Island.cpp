@@ -95,6 +95,7 @@ struct IslandSolver::Impl {
     void gather(const IslandInput& input);
     void beginTwoStep(const IslandInput& input, std::size_t shell);
     void assemble(const IslandInput& input, bool atEnd);
+    bool isAnyFactored() const { return std::count(factored.begin(), factored.end(), 0) < std::ssize(factored); }
     void readFreeTwists();
     bool overstretches(const IslandInput& input, bool isAgain) const;
     double elasticEnergyAfter(const IslandInput& input, std::size_t shell, const Points& velocities) const;
@@ -136,7 +137,7 @@ StepReport IslandSolver::solve(const IslandInput& input) {
     s.times = {};
     s.gather(input);
     LapTimer lap(input);
-    const ContactResponse::Numbering numbering{s.offsets, s.dynamicIndex, s.stepOf, s.factored};
+    const ContactResponse::Numbering numbering{s.offsets, s.dynamicIndex, s.stepOf, s.isAnyFactored()};
     s.response.begin(input, numbering, s.expected, s.y);  // contacts at the start, y
     lap.addTo(s.times.contact);
     s.solveStep(input, report);  // A, b; filtered PCG until the contacts agree
@@ -484,9 +485,8 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
         parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions(), factored[k] != 0,
                          isIncomplete && !factored[k] && n >= kLeastCompact});
     }
-    const bool isAnyFactored = std::count(factored.begin(), factored.end(), 0) < std::ssize(factored);
     // Bodies that rest on the solution feel what single precision leaves over: soft rows and stacks lose their balance.
-    const bool isSingle = dynamicBodies.empty() && !isAnyFactored &&
+    const bool isSingle = dynamicBodies.empty() && !isAnyFactored() &&
                           linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance && isIncomplete;
     system.begin(std::move(parts), static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(),
                  supports.couplings(), isSingle ? Precision::Single : Precision::Double, isSingle ? team : nullptr);

@@ -94,8 +94,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     if (!input.contacts) return;
 
     m_care = isAmongWalls() && !isAnyStiff() ? kAmongWalls : kInFull;
-    if (std::count(numbering.factored.begin(), numbering.factored.end(), 0) < std::ssize(numbering.factored))
-        m_care = kStiff;
+    if (numbering.isAnyFactored) m_care = kStiff;
     m_creep = creepSpeed();
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);
     m_faceSlop = std::min(2e-4, 1e-2 * shortest);

@@ -30,7 +30,7 @@ class ContactResponse {
         const std::vector<int>& offsets;       ///< of each shell's vertices
         const std::vector<int>& dynamicIndex;  ///< of each body; -1: prescribed
         const std::vector<double>& stepOf;     ///< length of the step as each shell's integrator counts it [s]
-        const std::vector<char>& factored;     ///< shells: completely
+        bool isAnyFactored;                    ///< some shell: completely
     };
     /// Contacts at the start of the step, and the position alteration y of vertices that stand inside a body.
     /// `expected`: velocities at the end of the step as they would be if the last step's change went on; kept by
