@@ -84,6 +84,16 @@ bool BlockMatrix::contains(int row, int column) const {
     return std::binary_search(begin, end, column);
 }
 
+std::vector<std::vector<int>> BlockMatrix::neighbours() const {
+    std::vector<std::vector<int>> result(size());
+    for (int i = 0; i < size(); ++i)
+        for (int k = rowBegin(i); k < rowEnd(i); ++k) {
+            result[i].push_back(column(k));
+            result[column(k)].push_back(i);
+        }
+    return result;
+}
+
 void BlockMatrix::setZero() {
     std::fill(m_diagonal.begin(), m_diagonal.end(), Mat3::Zero());
     std::fill(m_lower.begin(), m_lower.end(), Mat3::Zero());

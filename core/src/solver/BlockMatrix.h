@@ -39,6 +39,7 @@ class BlockMatrix {
     int rowBegin(int row) const { return m_rowStart[row]; }
     int rowEnd(int row) const { return m_rowStart[row + 1]; }
     int column(int k) const { return m_column[k]; }
+    std::vector<std::vector<int>> neighbours() const;  ///< per vertex those that it shares a block with
 
     /// From now on the matrix has `factor` times `scalars` beside its blocks. They must outlive it
     /// and never change; null: nothing.

@@ -13,16 +13,6 @@ constexpr int kRowsAtATime = 512;
 
 using Neighbours = std::vector<std::vector<int>>;
 
-Neighbours neighboursIn(const BlockMatrix& matrix) {
-    Neighbours result(matrix.size());
-    for (int i = 0; i < matrix.size(); ++i)
-        for (int k = matrix.rowBegin(i); k < matrix.rowEnd(i); ++k) {
-            result[i].push_back(matrix.column(k));
-            result[matrix.column(k)].push_back(i);
-        }
-    return result;
-}
-
 /// Appends what `start` is connected to, layer by layer, each layer's vertices by rising degree; returns where the last
 /// layer begins.
 std::size_t appendLayers(const Neighbours& neighbours, int start, std::vector<char>& seen, std::vector<int>& order) {
@@ -145,7 +135,7 @@ JACKET_KERNEL void multiplyKernel(const CompactMatrix::View& view, int begin, in
 }  // namespace
 
 CompactMatrix::CompactMatrix(const BlockMatrix& matrix) : m_size(matrix.size()) {
-    const Neighbours neighbours = neighboursIn(matrix);
+    const Neighbours neighbours = matrix.neighbours();
     Division division = divide(neighbours, cuthillMcKee(neighbours));
     sortByLevel(neighbours, division);
     m_partStart.assign(2 * division.strips, 0);

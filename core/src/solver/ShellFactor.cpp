@@ -27,11 +27,7 @@ void forLower(const BlockMatrix& matrix, const auto& visit) {
 /// to go with. A few are left alone.
 std::vector<int> pairUp(const BlockMatrix& matrix) {
     const int n = matrix.size();
-    Neighbours neighbours(n);
-    forLower(matrix, [&](int i, int j, int) {
-        neighbours[i].push_back(j);
-        neighbours[j].push_back(i);
-    });
+    const Neighbours neighbours = matrix.neighbours();
     std::vector<int> pairOf(n, -1), open(n);
     for (int i = 0; i < n; ++i) open[i] = static_cast<int>(neighbours[i].size());
     int pairs = 0;
