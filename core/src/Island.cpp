@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory_resource>
 #include <stdexcept>
 
 #include "EdgeStretch.h"
@@ -60,6 +61,8 @@ bool isToBeFactored(const Shell& shell, double h, bool isNearBodies) {
     return n <= kSmall ? shell.isStiff(h) : isNearBodies && shell.bendingLength(h) > kEdges * shell.meanEdge();
 }
 
+using BodyVectors = Eigen::Matrix<double, 6, Eigen::Dynamic>;  ///< twists or momenta
+
 /// By how much damping makes a mass harder to move.
 double damping(const IslandInput& input, const Shell& shell) {
     return 1.0 + input.h * shell.material().massDamping;
@@ -68,6 +71,7 @@ double damping(const IslandInput& input, const Shell& shell) {
 }  // namespace
 
 struct IslandSolver::Impl {
+    std::pmr::unsynchronized_pool_resource pool;  ///< what a step gives back, the next one takes
     CoupledSystem system;
     CoupledPreconditioner preconditioner;
     FilteredPcg pcg;
@@ -83,15 +87,23 @@ struct IslandSolver::Impl {
     Points expected;                 ///< velocities if that goes on: the warm start
     Points unfiltered;               ///< (b - A v) at the solution, soft rows included
     CoupledVector u;
-    Eigen::Matrix<double, 6, Eigen::Dynamic> freeTwist;
+    Points guess, reached;       ///< velocities: what a solve starts from, and what the last one led to
+    Points newtonFrom, calmest;  ///< where the last Newton step was linearised, and where one that gained least was
+    std::vector<CoupledSystem::ShellPart> parts;
+    BodyVectors freeTwist, guessTwist;
+    BodyVectors twistChange;  ///< of the bodies' twists, by the shells
+    mutable BodyVectors twistsAtEnd, freeMomentum,
+        momentum;                                ///< of the bodies: twists at the end of the step, and momenta
     bool unsettled = false;                      ///< contacts of this step have used up their rounds
     int lastRounds = 1;                          ///< changes of the contacts in the last step, and one
     mutable Points at;                           ///< where velocities lead one shell
     mutable std::vector<double> elasticAtStart;  ///< of each shell at the start of the step; NaN: not yet asked for [J]
     StepTimes times;                             ///< of the step so far
+    StepReport lastReport;
     double impulseShare = 1.0;      ///< of the solved contacts that a step cut short takes: see limitDeformation
     std::vector<double> bodyShare;  ///< of that, what each dynamic body takes: see limitBodies
 
+    void clearReport();
     void gather(const IslandInput& input);
     void beginTwoStep(const IslandInput& input, std::size_t shell);
     void assemble(const IslandInput& input, bool atEnd);
@@ -107,8 +119,8 @@ struct IslandSolver::Impl {
     double shareWithin(const CoupledBody& body, int dynamic, double speed) const;
     void limitBodies(const IslandInput& input, StepReport& report);
     Points rigidMotion(const IslandInput& input, const Points& velocities) const;
-    Eigen::Matrix<double, 6, Eigen::Dynamic> endTwists() const;
-    bool improves(const IslandInput& input, const Points& before);
+    const BodyVectors& endTwists() const;
+    bool improves(const IslandInput& input);
     double incrementalPotential(const IslandInput& input, const Points& velocities) const;
     void solveStep(const IslandInput& input, StepReport& report);
     double linearTolerance(const IslandInput& input) const;
@@ -117,7 +129,7 @@ struct IslandSolver::Impl {
     void store(const IslandInput& input, StepReport& report);
     void pushOut(const IslandInput& input, StepReport& report);
     void balance(const IslandInput& input, std::vector<ContactImpulse>& impulses);
-    void shift(const IslandInput& input, const std::vector<Vec3>& onShells, std::vector<ContactImpulse>& impulses);
+    void shift(const IslandInput& input, std::span<const Vec3> onShells, std::vector<ContactImpulse>& impulses);
     bool giveToWalls(const IslandInput& input, int shell, const Vec3& impulse,
                      std::vector<ContactImpulse>& impulses) const;
 };
@@ -127,11 +139,12 @@ IslandSolver::~IslandSolver() = default;
 IslandSolver::IslandSolver(IslandSolver&&) noexcept = default;
 IslandSolver& IslandSolver::operator=(IslandSolver&&) noexcept = default;
 
-StepReport IslandSolver::solve(const IslandInput& input) {
+const StepReport& IslandSolver::solve(const IslandInput& input) {
     if (!(input.h > 0.0) || !std::isfinite(input.h))
         throw std::invalid_argument("IslandInput.h [s] must be > 0 and finite");
     Impl& s = *m_impl;
-    StepReport report;
+    StepReport& report = s.lastReport;
+    s.clearReport();
     s.impulseShare = 1.0;
     s.unsettled = false;
     s.times = {};
@@ -154,6 +167,13 @@ StepReport IslandSolver::solve(const IslandInput& input) {
     report.mayPass = s.response.hasFastBody() && (report.limited || s.unsettled);
     s.store(input, report);  // velocities, twists, reactions
     return report;
+}
+
+void IslandSolver::Impl::clearReport() {
+    std::vector<ContactImpulse> contacts = std::move(lastReport.contacts);  // and its memory
+    contacts.clear();
+    lastReport = {};
+    lastReport.contacts = std::move(contacts);
 }
 
 void IslandSolver::Impl::gather(const IslandInput& input) {
@@ -213,41 +233,42 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
         return shell->settings().integrator != Integrator::BackwardEuler;
     });
     const int most = toTheEnd ? kMostToTheEnd : kMostNewtonSteps;
-    Points calmest;  // linearised there the step gained least
     double leastGain = std::numeric_limits<double>::infinity();
+    int calmestStep = 1;
     assemble(input, false);
     for (int newton = 1;; ++newton) {
-        const Points before = newton == 1 ? Points() : v;  // most steps are over after the first
+        if (newton > 1) newtonFrom = v;  // most steps are over after the first
         solveRounds(input, report);
         if (!unfiltered.allFinite()) return;
-        const bool goOn = toTheEnd ? newton == 1 || improves(input, before) : overstretches(input, newton > 1);
+        const bool goOn = toTheEnd ? newton == 1 || improves(input) : overstretches(input, newton > 1);
         if (!goOn) return;
         if (const double gain = energyGain(input); gain < leastGain) {
             leastGain = gain;
-            calmest = before;
+            calmestStep = newton;
+            if (newton > 1) calmest.swap(newtonFrom);
         }
         if (newton == most) break;
         assemble(input, true);
     }
     report.converged = report.converged && !toTheEnd;
     if (energyGain(input) > std::max(leastGain, kEnergyGain)) {
-        v = calmest.cols() > 0 ? calmest : expected;  // as it is now, it may be anything
-        assemble(input, calmest.cols() > 0);          // back to what threw the shell about least
+        v = calmestStep > 1 ? calmest : expected;  // as it is now, it may be anything
+        assemble(input, calmestStep > 1);          // back to what threw the shell about least
         solveRounds(input, report);
     }
     const double mostGain = response.hasFastBody() && bodiesLead(input) ? kMostGainOfFast : kMostEnergyGain;
     if (unfiltered.allFinite() && energyGain(input) > mostGain) limitDeformation(input, report);
 }
 
-/// After one more Newton step from velocities `before`: goes back along it until the incremental potential is not above
-/// what it was, and says whether it was long enough to be worth another.
-bool IslandSolver::Impl::improves(const IslandInput& input, const Points& before) {
+/// After one more Newton step: goes back along it until the incremental potential is not above what it was, and says
+/// whether it was long enough to be worth another.
+bool IslandSolver::Impl::improves(const IslandInput& input) {
     constexpr double kSettled = 1e-3;  // of the step's change of velocity, or of what gravity does in it
     constexpr int kMostHalvings = 8;
     if (input.bodies.empty()) {
-        const double least = incrementalPotential(input, before);
+        const double least = incrementalPotential(input, newtonFrom);
         for (int i = 0; i < kMostHalvings && incrementalPotential(input, v) > least + 1e-12 * std::abs(least); ++i)
-            v = 0.5 * (v + before);
+            v = 0.5 * (v + newtonFrom);
         system.start(v, freeTwist, u);
     }
     double change = 0.0, all = floorOfReference(input, 0.1);
@@ -255,7 +276,7 @@ bool IslandSolver::Impl::improves(const IslandInput& input, const Points& before
         for (int i = 0; i < input.shells[k]->vertexCount(); ++i) {
             const double mass = input.shells[k]->masses()[i];
             const int column = offsets[k] + i;
-            change += mass * (v.col(column) - before.col(column)).squaredNorm();
+            change += mass * (v.col(column) - newtonFrom.col(column)).squaredNorm();
             all += mass * (v.col(column) - start.col(column)).squaredNorm();
         }
     return change > kSettled * kSettled * all;
@@ -368,9 +389,9 @@ Points IslandSolver::Impl::rigidMotion(const IslandInput& input, const Points& v
 }
 
 /// Twists of the dynamic bodies at the end of the step.
-Eigen::Matrix<double, 6, Eigen::Dynamic> IslandSolver::Impl::endTwists() const {
+const BodyVectors& IslandSolver::Impl::endTwists() const {
     const Eigen::Map<const Eigen::RowVectorXd> share(bodyShare.data(), freeTwist.cols());
-    return freeTwist + impulseShare * ((u.w - freeTwist).array().rowwise() * share.array()).matrix();
+    return twistsAtEnd = freeTwist + impulseShare * ((u.w - freeTwist).array().rowwise() * share.array()).matrix();
 }
 
 /// The largest share of its solved change of twist with which a body keeps within its energy without the shells and
@@ -392,7 +413,7 @@ double IslandSolver::Impl::shareWithin(const CoupledBody& body, int dynamic, dou
 /// the shell's velocities at the start are what is known of it.
 void IslandSolver::Impl::limitBodies(const IslandInput& input, StepReport& report) {
     const bool isSure = !unsettled && !report.limited;
-    const std::vector<double> speeds = isSure ? response.speedsBeside(start, v) : response.speedsBeside(start, start);
+    const std::vector<double>& speeds = response.speedsBeside(start, isSure ? v : start);
     double least = 1.0;
     for (std::size_t b = 0; b < dynamicBodies.size(); ++b) {
         const int body = dynamicBodies[b];
@@ -446,9 +467,8 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
         atStart += elasticAtStart[k];
         gain += elasticEnergyAfter(input, k, v) - elasticAtStart[k];
     }
-    Eigen::Matrix<double, 6, Eigen::Dynamic> freeMomentum, momentum;
     system.momentum(freeTwist, freeMomentum);
-    const Eigen::Matrix<double, 6, Eigen::Dynamic> twists = endTwists();
+    const BodyVectors& twists = endTwists();
     system.momentum(twists, momentum);
     for (std::size_t b = 0; b < dynamicBodies.size(); ++b) {
         const double kinetic = 0.5 * freeTwist.col(b).dot(freeMomentum.col(b));
@@ -475,7 +495,7 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
     LapTimer lap(input);
     WorkerTeam* const team = start.cols() < kLeastForTeam ? nullptr : input.team;
     const bool isIncomplete = input.shells[0]->settings().preconditioner == Preconditioner::IncompleteCholesky;
-    std::vector<CoupledSystem::ShellPart> parts;
+    parts.clear();
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const int n = input.shells[k]->vertexCount();
         const Eigen::Ref<const Points> ahead = (atEnd ? v : start).middleCols(offsets[k], n);
@@ -488,8 +508,8 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
     // Bodies that rest on the solution feel what single precision leaves over: soft rows and stacks lose their balance.
     const bool isSingle = dynamicBodies.empty() && !isAnyFactored() &&
                           linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance && isIncomplete;
-    system.begin(std::move(parts), static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(),
-                 supports.couplings(), isSingle ? Precision::Single : Precision::Double, isSingle ? team : nullptr);
+    system.begin(parts, static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(), supports.couplings(),
+                 isSingle ? Precision::Single : Precision::Double, isSingle ? team : nullptr);
     readFreeTwists();
     lap.addTo(times.assembly);
 }
@@ -525,8 +545,8 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
     const double tolerance = linearTolerance(input);
     int maxIterations = settings.maxIterations;
     for (const Shell* shell : input.shells) maxIterations = std::max(maxIterations, shell->settings().maxIterations);
-    Points guess = report.solves == 0 ? expected : v;
-    Eigen::Matrix<double, 6, Eigen::Dynamic> guessTwist = report.solves == 0 ? freeTwist : u.w;
+    guess = report.solves == 0 ? expected : v;
+    guessTwist = report.solves == 0 ? freeTwist : u.w;
     u.resize(static_cast<int>(start.cols()), system.bodyCount());
     int freshIterations = -1, lastIterations = 0;  // of the first solve with the present factor, and of the last one
     bool roughly = response.isQuick() && response.hasContacts() && lastRounds > 1;
@@ -583,9 +603,9 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
 void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
     response.finish(report.contacts);
     if (impulseShare == 0.0) report.contacts.clear();
-    Eigen::Matrix<double, 6, Eigen::Dynamic> change;
-    const Eigen::Matrix<double, 6, Eigen::Dynamic> twists = endTwists();
-    system.momentum(twists - freeTwist, change);
+    const BodyVectors& twists = endTwists();
+    twistChange = twists - freeTwist;
+    system.momentum(twistChange, momentum);
     for (ContactImpulse& contact : report.contacts) {
         const int dynamic = dynamicIndex[contact.contact.body];
         contact.impulse *= impulseShare * (dynamic < 0 ? 1.0 : bodyShare[dynamic]);
@@ -594,7 +614,7 @@ void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
         CoupledBody& body = input.bodies[b];
         body.twist = body.prescribed ? body.freeTwist : Vec6(twists.col(dynamicIndex[b]));
         // The solved change of momentum, not the sum of the contacts' impulses: a light body would feel their residual.
-        body.impulse = body.prescribed ? Vec6::Zero() : Vec6(change.col(dynamicIndex[b]));
+        body.impulse = body.prescribed ? Vec6::Zero() : Vec6(momentum.col(dynamicIndex[b]));
     }
     balance(input, report.contacts);
     if (!report.limited) pushOut(input, report);
@@ -628,13 +648,13 @@ void IslandSolver::Impl::pushOut(const IslandInput& input, StepReport& report) {
 /// momentum changed by are the same to rounding. The residual that the solve left is spread over contacts and vertices.
 void IslandSolver::Impl::balance(const IslandInput& input, std::vector<ContactImpulse>& impulses) {
     const auto count = input.bodies.size();
-    std::vector<Vec6> onBodies(count, Vec6::Zero());
-    std::vector<double> pressed(count, 0.0);
+    std::pmr::vector<Vec6> onBodies(count, Vec6::Zero(), &pool);
+    std::pmr::vector<double> pressed(count, 0.0, &pool);
     for (const auto& [contact, impulse, sticks, slip] : impulses) {
         onBodies[contact.body] -= pointImpulse(impulse, contactArm(input, contact));
         pressed[contact.body] += impulse.norm();
     }
-    std::vector<Vec3> onShells(input.shells.size(), Vec3::Zero());
+    std::pmr::vector<Vec3> onShells(input.shells.size(), Vec3::Zero(), &pool);
     for (const auto& anchor : input.anchors) {
         const Vec3 impulse = -impulseShare * unfiltered.col(offsets[anchor.shell] + anchor.vertex);
         onBodies[anchor.body] -= pointImpulse(impulse, anchor.point - input.bodies[anchor.body].position);
@@ -652,18 +672,17 @@ void IslandSolver::Impl::balance(const IslandInput& input, std::vector<ContactIm
 
 /// The shells' part of it. Walls take what is missing: a shell that they hold is stiff, and its mass would turn little
 /// force into much speed. A shell that touches none moves by it.
-void IslandSolver::Impl::shift(const IslandInput& input, const std::vector<Vec3>& onShells,
+void IslandSolver::Impl::shift(const IslandInput& input, std::span<const Vec3> onShells,
                                std::vector<ContactImpulse>& impulses) {
-    Points solvedV;  // `v` may have been cut short since
-    system.velocities(u, solvedV);
+    system.velocities(u, reached);  // `v` may have been cut short since
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         if (shell.pinCount() > 0) continue;
-        Vec3 solved = -unfiltered.middleCols(offsets[k], shell.vertexCount()).rowwise().sum();
+        Vec3 given = -unfiltered.middleCols(offsets[k], shell.vertexCount()).rowwise().sum();
         for (const auto& row : system.rows())
             if (row.vertices[0] >= offsets[k] && row.vertices[0] < offsets[k] + shell.vertexCount())
-                solved += system.rowImpulse(row, solvedV, u.w);
-        const Vec3 missing = impulseShare * solved - onShells[k];
+                given += system.rowImpulse(row, reached, u.w);
+        const Vec3 missing = impulseShare * given - onShells[k];
         if (giveToWalls(input, static_cast<int>(k), missing, impulses)) continue;
         v.middleCols(offsets[k], shell.vertexCount()).colwise() -=
             (missing / (shell.masses().sum() * damping(input, shell))).eval();

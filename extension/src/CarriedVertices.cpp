@@ -1,7 +1,7 @@
 #include "CarriedVertices.h"
 
 #include <Eigen/Cholesky>
-#include <set>
+#include <algorithm>
 
 #include "ObjectId.h"
 
@@ -29,29 +29,28 @@ void CarriedVertices::add(ShellBody& shell, int vertex, const Obstacle& obstacle
 }
 
 void CarriedVertices::move(const btCollisionWorld& world, double h) {
-    std::set<ShellBody*> shells;
+    m_shells.clear();
     for (const Carried& carried : m_vertices)
-        if (!carried.shell->isAsleep()) shells.insert(carried.shell);
-    for (ShellBody* body : shells) {
-        std::vector<Shift> shifts = shiftsOf(*body, world, h);
+        if (!carried.shell->isAsleep() && std::find(m_shells.begin(), m_shells.end(), carried.shell) == m_shells.end())
+            m_shells.push_back(carried.shell);
+    for (ShellBody* body : m_shells) {
+        findShifts(*body, world, h);
         Shell& shell = body->m_shell;
-        if (shell.isStiff(h)) moveAsOne(*body, shifts);
-        for (const auto& [carried, by] : shifts) shell.displace(carried->vertex, by);
+        if (shell.isStiff(h)) moveAsOne(*body, m_shifts);
+        for (const auto& [carried, by] : m_shifts) shell.displace(carried->vertex, by);
     }
     m_vertices.clear();
 }
 
-std::vector<CarriedVertices::Shift> CarriedVertices::shiftsOf(const ShellBody& shell, const btCollisionWorld& world,
-                                                              double h) const {
-    std::vector<Shift> shifts;
+void CarriedVertices::findShifts(const ShellBody& shell, const btCollisionWorld& world, double h) {
+    m_shifts.clear();
     for (const Carried& c : m_vertices) {
         if (c.shell != &shell || idOf(world, c.object) != c.objectId) continue;
         const Vec3 assumed = shell.shell().positions().col(c.vertex);
         const Vec3 local = c.anchor ? *c.anchor : moved(c.start, c.twist, h).inverse(Eigen::Isometry) * assumed;
         const Vec3 by = fromBullet(c.object->getWorldTransform()) * local - assumed;
-        if (by.norm() < kTeleport * h && by.allFinite()) shifts.push_back({&c, by});
+        if (by.norm() < kTeleport * h && by.allFinite()) m_shifts.push_back({&c, by});
     }
-    return shifts;
 }
 
 /// The vertices of a stiff shell move together, or contacts would bend it: the rigid motion that is nearest to what

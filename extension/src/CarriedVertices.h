@@ -33,10 +33,12 @@ class CarriedVertices {
         const Carried* carried;
         Vec3 by;  ///< [m]
     };
-    std::vector<Shift> shiftsOf(const ShellBody& shell, const btCollisionWorld& world, double h) const;
+    void findShifts(const ShellBody& shell, const btCollisionWorld& world, double h);
     static void moveAsOne(ShellBody& shell, std::vector<Shift>& shifts);
 
     std::vector<Carried> m_vertices;
+    std::vector<ShellBody*> m_shells;  ///< that have any
+    std::vector<Shift> m_shifts;       ///< of one of them
 };
 
 }  // namespace jacket::bullet

@@ -99,33 +99,41 @@ void ContactManifolds::Pair::setPoints(std::span<const FeaturePoint> points) {
 /// A pair that touches, with its strongest contacts.
 struct ContactManifolds::Touch {
     Pair* pair;
-    std::vector<FeaturePoint> points;
+    std::size_t count = 0;
+    std::array<FeaturePoint, MANIFOLD_CACHE_SIZE> points{};  ///< the strongest first, of equal ones the first
+    void add(const FeaturePoint& added);
 };
 
-std::vector<ContactManifolds::Touch> ContactManifolds::collect(btCollisionWorld& world,
-                                                               std::span<const std::unique_ptr<ShellBody>> shells) {
-    std::vector<Touch> touches;
+void ContactManifolds::Touch::add(const FeaturePoint& added) {
+    const auto isStronger = [](const FeaturePoint& a, const FeaturePoint& b) {
+        return a.point.m_appliedImpulse > b.point.m_appliedImpulse;
+    };
+    const auto place = std::upper_bound(points.begin(), points.begin() + count, added, isStronger);
+    if (place == points.end()) return;
+    count = std::min(count + 1, points.size());
+    std::copy_backward(place, points.begin() + count - 1, points.begin() + count);
+    *place = added;
+}
+
+ContactManifolds::ContactManifolds() = default;
+ContactManifolds::~ContactManifolds() = default;
+
+void ContactManifolds::collect(btCollisionWorld& world, std::span<const std::unique_ptr<ShellBody>> shells) {
+    m_touches.clear();
     for (const auto& shell : shells) {
         if (shell->isAsleep()) continue;
-        const auto first = static_cast<std::ptrdiff_t>(touches.size());  // of this shell
+        const auto first = static_cast<std::ptrdiff_t>(m_touches.size());  // of this shell
         for (std::size_t i = 0; i < shell->contacts().size(); ++i) {
             const btCollisionObject& body = *shell->contacts()[i].object;
             Pair* pair = pairOf(world, *shell, body);
             if (!pair) continue;
             pair->state().touchedAt = m_updates;
-            auto touch =
-                std::find_if(touches.begin() + first, touches.end(), [&](const Touch& t) { return t.pair == pair; });
-            if (touch == touches.end()) touch = touches.insert(touch, {pair, {}});
-            touch->points.push_back(toFeaturePoint(shell->contacts()[i]));
+            auto touch = std::find_if(m_touches.begin() + first, m_touches.end(),
+                                      [&](const Touch& t) { return t.pair == pair; });
+            if (touch == m_touches.end()) touch = m_touches.insert(touch, Touch{pair});
+            touch->add(toFeaturePoint(shell->contacts()[i]));
         }
     }
-    for (Touch& touch : touches) {
-        std::stable_sort(touch.points.begin(), touch.points.end(), [](const auto& a, const auto& b) {
-            return a.point.m_appliedImpulse > b.point.m_appliedImpulse;
-        });
-        if (touch.points.size() > MANIFOLD_CACHE_SIZE) touch.points.resize(MANIFOLD_CACHE_SIZE);
-    }
-    return touches;
 }
 
 /// None when the broadphase has no such pair or the pool of manifolds is empty.
@@ -154,27 +162,27 @@ bool ContactManifolds::isAlive(const Pair* pair) const {
 
 void ContactManifolds::update(btCollisionWorld& world, std::span<const std::unique_ptr<ShellBody>> shells) {
     ++m_updates;
-    const std::vector<Touch> touches = collect(world, shells);
-    std::vector<Pair*> ended;  // shells that sleep touch what they touched
-    std::copy_if(m_pairs.begin(), m_pairs.end(), std::back_inserter(ended), [&](const Pair* pair) {
+    collect(world, shells);
+    m_ended.clear();  // shells that sleep touch what they touched
+    std::copy_if(m_pairs.begin(), m_pairs.end(), std::back_inserter(m_ended), [&](const Pair* pair) {
         return pair->state().touchedAt != m_updates && pair->manifold().getNumContacts() > 0 &&
                !pair->state().shell.isAsleep();
     });
     // From here on every callback may remove shells and bodies, and with them pairs: ask before using one.
-    for (Pair* pair : ended) {
+    for (Pair* pair : m_ended) {
         if (!isAlive(pair)) continue;
         btPersistentManifold* manifold = &pair->manifold();
         pair->setPoints({});  // first, or a callback that removes the body would end the contact once more
         if (gContactEndedCallback && isAlive(pair)) gContactEndedCallback(manifold);
     }
-    for (const Touch& touch : touches) {
+    for (const Touch& touch : m_touches) {
         if (!isAlive(touch.pair)) continue;
         btPersistentManifold* manifold = &touch.pair->manifold();
         const bool starts = manifold->getNumContacts() == 0;
-        touch.pair->setPoints(touch.points);
+        touch.pair->setPoints({touch.points.data(), touch.count});
         if (starts && gContactStartedCallback && isAlive(touch.pair)) gContactStartedCallback(manifold);
     }
-    for (const Touch& touch : touches) {
+    for (const Touch& touch : m_touches) {
         for (int i = 0; isAlive(touch.pair) && i < touch.pair->manifold().getNumContacts(); ++i) {
             if (!gContactProcessedCallback) return;
             btPersistentManifold& manifold = touch.pair->manifold();

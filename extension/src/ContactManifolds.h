@@ -16,7 +16,8 @@ namespace jacket::bullet {
 /// solvers never respond to these manifolds. Those of sleeping shells stay as they are, and are not processed.
 class ContactManifolds {
   public:
-    ContactManifolds() = default;
+    ContactManifolds();
+    ~ContactManifolds();
     ContactManifolds(const ContactManifolds&) = delete;
     ContactManifolds& operator=(const ContactManifolds&) = delete;
 
@@ -27,11 +28,13 @@ class ContactManifolds {
   private:
     class Pair;
     struct Touch;
-    std::vector<Touch> collect(btCollisionWorld& world, std::span<const std::unique_ptr<ShellBody>> shells);
+    void collect(btCollisionWorld& world, std::span<const std::unique_ptr<ShellBody>> shells);
     Pair* pairOf(btCollisionWorld& world, ShellBody& shell, const btCollisionObject& body);
     bool isAlive(const Pair* pair) const;
     std::vector<Pair*> m_pairs;  ///< owned by Bullet's pair cache, which destroys them when shell or body leaves
     std::unordered_set<const btCollisionAlgorithm*> m_alive;  ///< the same
+    std::vector<Touch> m_touches;  ///< of the present update; a member to keep its memory, as the next
+    std::vector<Pair*> m_ended;
     int m_updates = 0;
 };
 

@@ -52,7 +52,9 @@ FastBodies::FastBodies(btCollisionWorld& world, Obstacles& obstacles, std::span<
 
 bool FastBodies::holdBack() {
     if (m_pairs.empty()) return false;
-    ShellContacts sweeper({m_shells.begin(), m_shells.end()}, m_obstacles, m_pairs);
+    const std::vector<const ShellBody*> shells(m_shells.begin(), m_shells.end());
+    ShellContacts::Memory memory;
+    ShellContacts sweeper(shells, m_obstacles, m_pairs, memory);
     std::vector<const Points*> start, end;
     for (std::size_t k = 0; k < m_shells.size(); ++k) {
         start.push_back(&m_start[k]);

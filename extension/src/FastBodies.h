@@ -1,4 +1,5 @@
 #pragma once
+#include <memory_resource>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -14,7 +15,7 @@ namespace jacket::bullet {
 class FastBodies {
   public:
     /// Twists that bodies were solved with, and that took them through no shell.
-    using Solved = std::unordered_map<const btCollisionObject*, Vec6>;
+    using Solved = std::pmr::unordered_map<const btCollisionObject*, Vec6>;
     /// Before the shells move. `shells` must outlive this. Bodies that move as they were solved are left alone.
     FastBodies(btCollisionWorld& world, Obstacles& obstacles, std::span<ShellBody* const> shells, const Solved& solved,
                double h);

@@ -11,8 +11,9 @@
 
 namespace jacket::bullet {
 
-IslandFinder::IslandFinder(btCollisionWorld& world, Obstacles& obstacles, std::span<ShellBody* const> shells)
-    : m_world(world), m_obstacles(obstacles), m_shells(shells) {
+IslandFinder::IslandFinder(btCollisionWorld& world, Obstacles& obstacles, std::span<ShellBody* const> shells,
+                           std::pmr::memory_resource& memory)
+    : m_world(world), m_obstacles(obstacles), m_shells(shells), m_memory(memory), m_neighbours(&memory) {
     collectPairs();
     collectAnchors();
     sort();
@@ -27,7 +28,7 @@ void IslandFinder::sort() {
 IslandFinder::Neighbour& IslandFinder::neighbour(btCollisionObject& object) {
     for (Neighbour& known : m_neighbours)
         if (known.object == &object) return known;
-    return m_neighbours.emplace_back(Neighbour{&object, {}, {}});
+    return m_neighbours.emplace_back(makeNeighbour(object));
 }
 
 void IslandFinder::collectPairs() {
@@ -58,10 +59,10 @@ void IslandFinder::collectAnchors() {
 
 /// For every shell, and then for every obstacle, the first shell of its island: shells are joined by the dynamic bodies
 /// that both have near, and by pairs of bodies that are. Obstacles of prescribed motion belong to none.
-std::vector<int> IslandFinder::leaders(const std::vector<Obstacle>& obstacles,
-                                       const std::vector<std::pair<int, int>>& joined) const {
+std::pmr::vector<int> IslandFinder::leaders(std::span<const Obstacle> obstacles,
+                                            std::span<const std::pair<int, int>> joined) const {
     const int shellCount = static_cast<int>(m_shells.size());
-    std::vector<int> leader(m_shells.size() + obstacles.size());
+    std::pmr::vector<int> leader(m_shells.size() + obstacles.size(), &m_memory);
     std::iota(leader.begin(), leader.end(), 0);
     const auto find = [&](int k) {
         while (leader[k] != k) k = leader[k];
@@ -81,36 +82,38 @@ std::vector<int> IslandFinder::leaders(const std::vector<Obstacle>& obstacles,
     return leader;
 }
 
-std::vector<Island> IslandFinder::find(double h, bool hasMoved) {
-    RigidContacts contacts(*m_world.getDispatcher());
-    std::vector<btCollisionObject*> objects;
+std::pmr::vector<Island> IslandFinder::find(double h, bool hasMoved) {
+    RigidContacts contacts(*m_world.getDispatcher(), m_memory);
+    std::pmr::vector<btCollisionObject*> objects(&m_memory);
     for (const Neighbour& n : m_neighbours) objects.push_back(n.object);
-    for (btCollisionObject* object : contacts.join(objects)) m_neighbours.push_back({object, {}, {}});
+    for (btCollisionObject* object : contacts.join(objects)) m_neighbours.push_back(makeNeighbour(*object));
     sort();
-    std::vector<Obstacle> obstacles;
+    std::pmr::vector<Obstacle> obstacles(&m_memory);
+    obstacles.reserve(m_neighbours.size());
     for (const Neighbour& n : m_neighbours) obstacles.push_back(m_obstacles.make(*n.object, h, &contacts, hasMoved));
     const std::vector<BodyCoupling> couplings = coupleLinks(obstacles, m_world, hasMoved ? 0.0 : h);
-    const std::vector<RigidContact> rigidContacts = contacts.between(obstacles);
-    std::vector<std::pair<int, int>> joined;
+    const std::pmr::vector<RigidContact> rigidContacts = contacts.between(obstacles);
+    std::pmr::vector<std::pair<int, int>> joined(&m_memory);
     for (const auto& c : couplings) joined.emplace_back(c.a, c.b);
     for (const auto& c : rigidContacts) joined.emplace_back(c.a, c.b);
-    const std::vector<int> leader = leaders(obstacles, joined);
+    const std::pmr::vector<int> leader = leaders(obstacles, joined);
 
-    std::vector<Island> islands;
-    std::vector<int> islandOf(m_shells.size()), indexInIsland(m_shells.size());
+    std::pmr::vector<Island> islands(&m_memory);
+    std::pmr::vector<int> islandOf(m_shells.size(), &m_memory), indexInIsland(m_shells.size(), &m_memory);
     for (std::size_t k = 0; k < m_shells.size(); ++k) {
         if (leader[k] == static_cast<int>(k)) {
             islandOf[k] = static_cast<int>(islands.size());
-            islands.emplace_back();
+            islands.emplace_back(&m_memory);
         }
         islandOf[k] = islandOf[leader[k]];
         indexInIsland[k] = static_cast<int>(islands[islandOf[k]].shells.size());
         islands[islandOf[k]].shells.push_back(m_shells[k]);
     }
-    std::vector<std::vector<int>> bodyIn(islands.size(), std::vector<int>(obstacles.size(), -1));
+    const std::pmr::vector<int> nowhere(obstacles.size(), -1, &m_memory);
+    std::pmr::vector<std::pmr::vector<int>> bodyIn(islands.size(), nowhere, &m_memory);  // indices, by island
     for (std::size_t b = 0; b < obstacles.size(); ++b) {
         for (std::size_t i = 0; i < islands.size(); ++i) {
-            Neighbour here{m_neighbours[b].object, {}, {}};
+            Neighbour here = makeNeighbour(*m_neighbours[b].object);
             const auto inIsland = [&](int k) { return islandOf[k] == static_cast<int>(i); };
             std::copy_if(m_neighbours[b].near.begin(), m_neighbours[b].near.end(), std::back_inserter(here.near),
                          inIsland);
@@ -133,12 +136,12 @@ std::vector<Island> IslandFinder::find(double h, bool hasMoved) {
     return islands;
 }
 
-void IslandFinder::addObstacle(Island& island, const Obstacle& obstacle, const Neighbour& neighbour,
-                               const std::vector<int>& indexInIsland) const {
+void IslandFinder::addObstacle(Island& island, const Obstacle& obstacle, Neighbour& neighbour,
+                               std::span<const int> indexInIsland) const {
     const int body = static_cast<int>(island.obstacles.size());
     island.obstacles.push_back(obstacle);
     for (const int k : neighbour.near) island.pairs.emplace_back(indexInIsland[k], body);
-    std::vector<int> anchored = neighbour.anchored;
+    std::pmr::vector<int>& anchored = neighbour.anchored;
     anchored.erase(std::unique(anchored.begin(), anchored.end()), anchored.end());
     for (const int k : anchored)
         for (const auto& anchor : m_shells[k]->m_anchors)

@@ -81,10 +81,15 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContact
         if (moves && !hasMoved && m_gravityIsNoForce)
             coupled.freeTwist.head<3>() += h * fromBullet(rigid->getGravity());
         if (moves) coupled.mass = massOf(*rigid);
-        if (moves && contacts) contacts->addSupports(*rigid, hasMoved ? 0.0 : h, coupled);
+        if (moves && contacts) contacts->addSupports(*rigid, hasMoved ? 0.0 : h, coupled, freeSupports());
     }
     coupled.position = obstacle.start.translation();
     return obstacle;
+}
+
+std::vector<BodySupport>& Obstacles::freeSupports() {
+    if (m_supportCount == m_supports.size()) m_supports.emplace_back();
+    return m_supports[m_supportCount++];
 }
 
 /// Of a body that its user moves. Bullet's velocity, where it took one from the same poses, is the mean over all

@@ -38,18 +38,23 @@ class Obstacles {
   public:
     /// Static, kinematic and sleeping bodies become bodies of prescribed motion. `contacts`: what holds bodies, or
     /// null. `hasMoved`: every body starts where it stood h ago, with the velocity that it has: the motion that Bullet
-    /// has already made, instead of the coming one. Links that are not prescribed get their mass from coupleLinks.
+    /// has already made, instead of the coming one. Links that are not prescribed get their mass from coupleLinks. What
+    /// an obstacle's body rests on is kept here until the next step begins.
     Obstacle make(btCollisionObject& object, double h, const RigidContacts* contacts, bool hasMoved);
     /// Shapes without any piece that shells can touch are reported here once, by Bullet's name of the shape.
     std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }
     /// Before anything else in a step: what moves without Bullet's doing is known by its poses at two steps.
-    void beginStep() { ++m_step; }
+    void beginStep() {
+        ++m_step;
+        m_supportCount = 0;
+    }
     /// False for bodies that no solve could take, see defectOf; warns once of each.
     bool isUsable(const btCollisionObject& object);
     /// Whether the world adds gravity to velocities itself instead of leaving it in the bodies' total force.
     void setGravityIsNoForce(bool value) { m_gravityIsNoForce = value; }
 
   private:
+    std::vector<BodySupport>& freeSupports();
     const ShapePieces& piecesOf(const btCollisionShape& shape);
     std::unordered_map<const btCollisionShape*, ShapePieces> m_shapes;
     std::vector<std::string> m_warnings;
@@ -61,6 +66,8 @@ class Obstacles {
     };
     Vec6 prescribedTwist(const btCollisionObject& object, double h, double radius);
     std::unordered_map<const btCollisionObject*, Pose> m_poses;  ///< of static and kinematic objects
+    std::vector<std::vector<BodySupport>> m_supports;  ///< of the step's bodies; those beyond m_supportCount: free
+    std::size_t m_supportCount = 0;
     long m_step = 0;
     bool m_gravityIsNoForce = false;
 };

@@ -77,14 +77,14 @@ void RigidContacts::index() {
     }
 }
 
-const std::vector<btPersistentManifold*>& RigidContacts::manifoldsOf(const btCollisionObject& object) const {
-    static const std::vector<btPersistentManifold*> kNone;
+std::span<btPersistentManifold* const> RigidContacts::manifoldsOf(const btCollisionObject& object) const {
     const auto known = m_manifolds.find(&object);
-    return known == m_manifolds.end() ? kNone : known->second;
+    if (known == m_manifolds.end()) return {};
+    return known->second;
 }
 
-std::vector<btCollisionObject*> RigidContacts::join(const std::vector<btCollisionObject*>& bodies) {
-    std::vector<btCollisionObject*> pile, fresh;
+std::pmr::vector<btCollisionObject*> RigidContacts::join(std::span<btCollisionObject* const> bodies) {
+    std::pmr::vector<btCollisionObject*> pile(&m_memory), fresh(&m_memory);
     for (btCollisionObject* body : bodies)
         if (isFree(*body) && m_joined.insert(body).second) pile.push_back(body);
     if (!pile.empty()) index();                             // most shells touch what stands still
@@ -99,7 +99,9 @@ std::vector<btCollisionObject*> RigidContacts::join(const std::vector<btCollisio
     return fresh;
 }
 
-void RigidContacts::addSupports(const btRigidBody& body, double h, CoupledBody& coupled) const {
+void RigidContacts::addSupports(const btRigidBody& body, double h, CoupledBody& coupled,
+                                std::vector<BodySupport>& supports) const {
+    supports.clear();
     for (const btPersistentManifold* manifold : manifoldsOf(body)) {
         const btCollisionObject* otherObject = otherThan(body, *manifold);
         if (m_joined.count(&body) > 0 && m_joined.count(otherObject) > 0) continue;
@@ -113,23 +115,24 @@ void RigidContacts::addSupports(const btRigidBody& body, double h, CoupledBody& 
             const Vec3 n = (first ? 1.0 : -1.0) * fromBullet(point.m_normalWorldOnB);
             const Vec3 at = fromBullet(first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
             const double velocity = other ? pointVelocity(*other, at, h).dot(n) : 0.0;
-            coupled.supports.push_back({rowOf(n, at, coupled.position), velocity, weight});
+            supports.push_back({rowOf(n, at, coupled.position), velocity, weight});
         }
     }
-    if (coupled.supports.empty()) return;
+    coupled.supports = supports;
+    if (supports.empty()) return;
     Vec6 momentum = coupled.mass * coupled.freeTwist;
-    for (const auto& [row, velocity, weight] : coupled.supports) {
+    for (const auto& [row, velocity, weight] : supports) {
         coupled.mass += weight * row * row.transpose();
         momentum += weight * velocity * row;
     }
     coupled.freeTwist = coupled.mass.ldlt().solve(momentum);
 }
 
-std::vector<RigidContact> RigidContacts::between(const std::vector<Obstacle>& obstacles) const {
-    std::unordered_map<const btCollisionObject*, int> indexOf;
+std::pmr::vector<RigidContact> RigidContacts::between(std::span<const Obstacle> obstacles) const {
+    std::pmr::unordered_map<const btCollisionObject*, int> indexOf(&m_memory);
     for (int b = 0; b < static_cast<int>(obstacles.size()); ++b)
         if (m_joined.count(obstacles[b].object) > 0) indexOf[obstacles[b].object] = b;
-    std::vector<RigidContact> contacts;
+    std::pmr::vector<RigidContact> contacts(&m_memory);
     for (int b = 0; b < static_cast<int>(obstacles.size()); ++b) {
         if (indexOf.count(obstacles[b].object) == 0) continue;
         for (const btPersistentManifold* manifold : manifoldsOf(*obstacles[b].object)) {

@@ -1,6 +1,8 @@
 #pragma once
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
+#include <memory_resource>
+#include <span>
 #include <unordered_map>
 #include <unordered_set>
 #include <vector>
@@ -23,23 +25,26 @@ Vec6 freeTwistOf(const btRigidBody& body, double h);
 /// too, or a shell would press a supported box through the floor, and feel only the lowest one of a pile.
 class RigidContacts {
   public:
-    explicit RigidContacts(btDispatcher& dispatcher) : m_dispatcher(dispatcher) {}
+    RigidContacts(btDispatcher& dispatcher, std::pmr::memory_resource& memory)
+        : m_dispatcher(dispatcher), m_memory(memory), m_manifolds(&memory), m_joined(&memory) {}
     /// To be called first. The free bodies of the piles that these belong to, up to a number that a solve can carry.
     /// Contacts between any of all these are `between`'s, and not `addSupports`' any more.
-    std::vector<btCollisionObject*> join(const std::vector<btCollisionObject*>& bodies);
+    std::pmr::vector<btCollisionObject*> join(std::span<btCollisionObject* const> bodies);
     /// What holds a body in the coming step of length h besides the joined bodies: stiff terms of its mass. A free body
-    /// among that is as heavy as it is.
-    void addSupports(const btRigidBody& body, double h, CoupledBody& coupled) const;
+    /// among that is as heavy as it is. `supports`: what coupled.supports will show.
+    void addSupports(const btRigidBody& body, double h, CoupledBody& coupled, std::vector<BodySupport>& supports) const;
     /// Contacts among the joined bodies; indices of obstacles.
-    std::vector<RigidContact> between(const std::vector<Obstacle>& obstacles) const;
+    std::pmr::vector<RigidContact> between(std::span<const Obstacle> obstacles) const;
 
   private:
     void index();
-    const std::vector<btPersistentManifold*>& manifoldsOf(const btCollisionObject& object) const;
+    using Manifolds = std::pmr::vector<btPersistentManifold*>;
+    std::span<btPersistentManifold* const> manifoldsOf(const btCollisionObject& object) const;
 
     btDispatcher& m_dispatcher;
-    std::unordered_map<const btCollisionObject*, std::vector<btPersistentManifold*>> m_manifolds;
-    std::unordered_set<const btCollisionObject*> m_joined;
+    std::pmr::memory_resource& m_memory;
+    std::pmr::unordered_map<const btCollisionObject*, Manifolds> m_manifolds;
+    std::pmr::unordered_set<const btCollisionObject*> m_joined;
 };
 
 }  // namespace jacket::bullet

@@ -57,11 +57,18 @@ struct ShellContacts::Query {
     bool wantsFaces() const { return faceReach > -std::numeric_limits<double>::infinity(); }
 };
 
-ShellContacts::ShellContacts(std::vector<const ShellBody*> shells, const std::vector<Obstacle>& obstacles,
-                             std::vector<std::pair<int, int>> pairs)
-    : m_shells(std::move(shells)), m_obstacles(obstacles), m_pairs(std::move(pairs)) {
-    m_sides.resize(m_pairs.size());
-    m_depth.assign(m_pairs.size(), 0.0);
+ShellContacts::ShellContacts(std::span<const ShellBody* const> shells, std::span<const Obstacle> obstacles,
+                             std::span<const std::pair<int, int>> pairs, Memory& memory)
+    : m_shells(shells),
+      m_obstacles(obstacles),
+      m_pairs(pairs),
+      m_memory(memory),
+      m_materials(&memory.pool),
+      m_byFeature(&memory.pool),
+      m_sides(pairs.size(), &memory.pool),
+      m_patches(&memory.pool),
+      m_depth(pairs.size(), 0.0, &memory.pool) {
+    m_patches.reserve(m_pairs.size());
     for (const auto& [shell, body] : m_pairs) m_patches.emplace_back(m_obstacles[body].shape->concave.size());
 }
 
@@ -71,7 +78,7 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
         const auto [shell, body] = m_pairs[pair];
         const Obstacle& obstacle = m_obstacles[body];
         m_byFeature.clear();
-        m_candidates.clear();
+        m_memory.candidates.clear();
         const auto first = static_cast<std::ptrdiff_t>(contacts.size());
         Query query{pair,
                     shell,
@@ -100,7 +107,7 @@ void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
     lower.array() -= std::max(reach, 0.0);
     upper.array() += std::max(reach, 0.0);
     const int n = query.shellBody.vertexCount();
-    m_outside.resize(n);
+    m_memory.outside.resize(n);
     const Frame toBody = query.frame.inverse(Eigen::Isometry);
     for (int i = 0; i < n; ++i) {
         const Vec3 x = query.x.col(i);
@@ -109,10 +116,10 @@ void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
             outside |= static_cast<unsigned char>((x[k] < lower[k]) << (2 * k));
             outside |= static_cast<unsigned char>((x[k] > upper[k]) << (2 * k + 1));
         }
-        m_outside[i] = outside;
+        m_memory.outside[i] = outside;
         if (outside) continue;
         if (const auto surface = piece.touch(Vec3(toBody * x), query.vertexReach + query.thickness()))
-            m_candidates.push_back({i, *surface});
+            m_memory.candidates.push_back({i, *surface});
     }
 }
 
@@ -121,7 +128,7 @@ void ShellContacts::findFaces(Query& query, const ConvexPiece& piece) {
     const Frame toBody = query.frame.inverse(Eigen::Isometry);
     for (int t = 0; t < mesh.triangleCount(); ++t) {
         const auto corners = mesh.triangles().col(t);
-        if (m_outside[corners[0]] & m_outside[corners[1]] & m_outside[corners[2]]) continue;
+        if (m_memory.outside[corners[0]] & m_memory.outside[corners[1]] & m_memory.outside[corners[2]]) continue;
         Mat3 triangle;
         for (int a = 0; a < 3; ++a) triangle.col(a) = toBody * Vec3(query.x.col(corners[a]));
         const auto touch = piece.touch(triangle, query.faceReach + query.thickness());
@@ -151,7 +158,7 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
         touched.clear();
         patch->touch(Vec3(x.col(i)), reach, depth, touched);
         for (const SurfacePoint& s : touched)
-            m_candidates.push_back({i, {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance}});
+            m_memory.candidates.push_back({i, {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance}});
     }
     if (!query.wantsFaces()) return;
     std::vector<TrianglePoint> faces;
@@ -185,35 +192,39 @@ void ShellContacts::addFace(Query& query, int triangle, const TrianglePoint& tou
 void ShellContacts::addVertices(Query& query) {
     const HalfEdgeMesh& mesh = query.shellBody.shell().mesh();
     const int featureCount = mesh.vertexCount() + static_cast<int>(mesh.edges().size()) + mesh.triangleCount();
-    std::stable_sort(m_candidates.begin(), m_candidates.end(), [](const Candidate& a, const Candidate& b) {
+    auto& candidates = m_memory.candidates;
+    const auto isBefore = [](const auto& a, const auto& b) {
         return std::pair(a.vertex, a.surface.distance) < std::pair(b.vertex, b.surface.distance);
-    });
-    std::vector<SurfacePoint> kept;
-    for (std::size_t first = 0, next; first < m_candidates.size(); first = next) {
-        const int vertex = m_candidates[first].vertex;
+    };
+    if (!std::is_sorted(candidates.begin(), candidates.end(), isBefore))  // one piece: it is
+        std::stable_sort(candidates.begin(), candidates.end(), isBefore);
+    std::vector<SurfacePoint>& kept = m_memory.kept;
+    for (std::size_t first = 0, next; first < candidates.size(); first = next) {
+        const int vertex = candidates[first].vertex;
         kept.clear();
-        for (next = first; next < m_candidates.size() && m_candidates[next].vertex == vertex; ++next) {
-            const SurfacePoint& surface = m_candidates[next].surface;
+        for (next = first; next < candidates.size() && candidates[next].vertex == vertex; ++next) {
+            const SurfacePoint& surface = candidates[next].surface;
             if (std::none_of(kept.begin(), kept.end(), [&](const auto& nearer) { return isCovered(surface, nearer); }))
                 kept.push_back(surface);
         }
-        const std::vector<int> sides = sidesOf(m_sides[query.pair][vertex], kept);
+        findSides(m_sides[query.pair][vertex], kept);
         for (std::size_t k = 0; k < kept.size(); ++k)
-            add(query, Feature::vertex(vertex) + sides[k] * featureCount, kept[k], {vertex, vertex, vertex},
+            add(query, Feature::vertex(vertex) + m_memory.sides[k] * featureCount, kept[k], {vertex, vertex, vertex},
                 Vec3::UnitX());
     }
 }
 
 /// For each surface that a vertex touches the index of the known side that it belongs to: of much the same normal, or
 /// one over whose ridge the vertex has gone. Others become known.
-std::vector<int> ShellContacts::sidesOf(Sides& known, std::vector<SurfacePoint>& surfaces) {
+void ShellContacts::findSides(Sides& known, std::vector<SurfacePoint>& surfaces) {
     if (known.empty())  // the same order in the next step, whichever is nearer then
         std::sort(surfaces.begin(), surfaces.end(), [](const SurfacePoint& a, const SurfacePoint& b) {
             return std::lexicographical_compare(a.normal.data(), a.normal.data() + 3, b.normal.data(),
                                                 b.normal.data() + 3);
         });
     const int knownCount = int(known.size());
-    std::vector<int> sides(surfaces.size(), -1);
+    std::vector<int>& sides = m_memory.sides;
+    sides.assign(surfaces.size(), -1);
     const auto isFree = [&](int side) { return std::find(sides.begin(), sides.end(), side) == sides.end(); };
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
         double most = kSameSide;
@@ -231,7 +242,6 @@ std::vector<int> ShellContacts::sidesOf(Sides& known, std::vector<SurfacePoint>&
         }
     }
     for (std::size_t i = 0; i < surfaces.size(); ++i) known[sides[i]] = surfaces[i];
-    return sides;
 }
 
 /// What shell and body make of it together: the products, as Bullet combines them, or what the user makes of these. A

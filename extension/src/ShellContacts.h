@@ -1,8 +1,8 @@
 #pragma once
 #include <map>
 #include <memory>
+#include <memory_resource>
 #include <tuple>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -18,9 +18,11 @@ namespace jacket::bullet {
 /// those of `Feature` for the first, and higher ones for the others; within the step each side keeps its id.
 class ShellContacts final : public ContactDetector {
   public:
-    /// `pairs`: (shell, obstacle) indices that Bullet's broadphase found near each other.
-    ShellContacts(std::vector<const ShellBody*> shells, const std::vector<Obstacle>& obstacles,
-                  std::vector<std::pair<int, int>> pairs);
+    class Memory;
+    /// `pairs`: (shell, obstacle) indices that Bullet's broadphase found near each other. All that is given must
+    /// outlive this.
+    ShellContacts(std::span<const ShellBody* const> shells, std::span<const Obstacle> obstacles,
+                  std::span<const std::pair<int, int>> pairs, Memory& memory);
     void find(const ContactPose& pose, double vertexReach, double faceReach, std::vector<Contact>& contacts) override;
     void sweep(const ContactSweep& motion, std::vector<Contact>& contacts) override;
 
@@ -35,31 +37,39 @@ class ShellContacts final : public ContactDetector {
     void addFace(Query& query, int triangle, const TrianglePoint& touch);
     void addVertices(Query& query);
     void setMaterial(Contact& contact);
-    using Sides = std::vector<SurfacePoint>;
-    static std::vector<int> sidesOf(Sides& known, std::vector<SurfacePoint>& surfaces);
+    using Sides = std::pmr::vector<SurfacePoint>;
+    void findSides(Sides& known, std::vector<SurfacePoint>& surfaces);
 
-    std::vector<const ShellBody*> m_shells;
-    const std::vector<Obstacle>& m_obstacles;
-    std::vector<std::pair<int, int>> m_pairs;
+    std::span<const ShellBody* const> m_shells;
+    std::span<const Obstacle> m_obstacles;
+    std::span<const std::pair<int, int>> m_pairs;
+    Memory& m_memory;
     /// What the user made of a contact when it was first found in this step.
     struct Material {
         double friction, restitution;
     };
-    std::map<std::tuple<int, int, int>, Material> m_materials;  ///< of shell, body and feature
-    std::vector<unsigned char> m_outside;    ///< per vertex: which sides of the obstacle's box it lies beyond
-    std::map<int, std::size_t> m_byFeature;  ///< of the present pair: index in the result
+    std::pmr::map<std::tuple<int, int, int>, Material> m_materials;  ///< of shell, body and feature
+    std::pmr::map<int, std::size_t> m_byFeature;                     ///< of the present pair: index in the result
+    /// Of each pair, for vertices that came near: the sides of a valley that it has met in this step, in the body's
+    /// frame. Their index is part of a contact's id.
+    std::pmr::vector<std::pmr::map<int, Sides>> m_sides;
+    std::pmr::vector<std::vector<std::unique_ptr<TrianglePatch>>> m_patches;  ///< of each pair, of each concave piece
+    std::pmr::vector<double> m_depth;  ///< of each pair: from how deep behind triangles a vertex is pushed out [m]
+};
 
+/// What ShellContacts works with, kept from step to step: what one step has given back, the next one takes.
+class ShellContacts::Memory {
+    friend class ShellContacts;
     /// What a vertex can touch of the present body, in the body's frame.
     struct Candidate {
         int vertex;
         SurfacePoint surface;
     };
-    std::vector<Candidate> m_candidates;
-    /// Of each pair, for vertices that came near: the sides of a valley that it has met in this step, in the body's
-    /// frame. Their index is part of a contact's id.
-    std::vector<std::unordered_map<int, Sides>> m_sides;
-    std::vector<std::vector<std::unique_ptr<TrianglePatch>>> m_patches;  ///< of each pair, of each concave piece
-    std::vector<double> m_depth;  ///< of each pair: from how deep behind triangles a vertex is pushed out [m]
+    std::pmr::unsynchronized_pool_resource pool;
+    std::vector<unsigned char> outside;  ///< per vertex: which sides of the obstacle's box it lies beyond
+    std::vector<Candidate> candidates;
+    std::vector<SurfacePoint> kept;  ///< of one vertex
+    std::vector<int> sides;          ///< which of its sides each of them is
 };
 
 }  // namespace jacket::bullet

@@ -96,7 +96,7 @@ void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& cont
         const Obstacle& obstacle = m_obstacles[body];
         const HalfEdgeMesh& mesh = m_shells[shell]->shell().mesh();
         const int edgeCount = static_cast<int>(mesh.edges().size());
-        std::map<int, std::size_t> byFeature;
+        m_byFeature.clear();
         for (const auto& piece : obstacle.shape->pieces) {
             const Sweep sweep{*m_shells[shell], *motion.start[shell], *motion.end[shell], obstacle,
                               *piece,           motion.twists[body],  motion.time};
@@ -116,7 +116,7 @@ void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& cont
                     contact->vertices.fill(corners[corner]);
                     contact->weights = Vec3::UnitX();
                 }
-                const auto [known, fresh] = byFeature.try_emplace(contact->feature, contacts.size());
+                const auto [known, fresh] = m_byFeature.try_emplace(contact->feature, contacts.size());
                 if (fresh)
                     contacts.push_back(*contact);
                 else if (contact->time < contacts[known->second].time)

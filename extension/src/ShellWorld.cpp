@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
+#include <memory_resource>
 #include <optional>
 #include <stdexcept>
 #include <unordered_map>
@@ -90,10 +91,12 @@ struct Push {
 };
 
 struct ShellWorld::Impl {
+    std::pmr::unsynchronized_pool_resource memory;  ///< what a step gives back, the next one takes
+    ShellContacts::Memory contactMemory;
     Obstacles obstacles;
     std::map<const ShellBody*, IslandSolver> solvers;  ///< of each island, by its first shell
     CarriedVertices carried;
-    FastBodies::Solved solved;
+    FastBodies::Solved solved{&memory};
     std::unordered_map<const btCollisionObject*, Push> pushes;
     ContactManifolds manifolds;
     ShellChecks checks;
@@ -128,7 +131,7 @@ ShellBody& ShellWorld::add(const TriangleMesh& mesh, const ShellMaterial& materi
 void ShellWorld::remove(ShellBody& shell) {
     const auto found = std::find_if(m_shells.begin(), m_shells.end(), [&](const auto& s) { return s.get() == &shell; });
     if (found == m_shells.end()) throw std::invalid_argument("ShellWorld::remove: the shell is not in this world");
-    Sleepers(m_world, m_impl->obstacles, m_shells).wakeUp(shell);  // and what lay on it
+    Sleepers(m_world, m_impl->obstacles, m_shells, m_impl->memory).wakeUp(shell);  // and what lay on it
     const std::unique_ptr<ShellBody> removed = std::move(*found);
     m_shells.erase(found);
     m_impl->solvers.clear();  // they remember contacts by shell
@@ -187,7 +190,7 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     m_impl->obstacles.beginStep();
     releaseAnchors(*world);
     followGravity(double(h));
-    std::vector<ShellBody*> all;
+    std::pmr::vector<ShellBody*> all(&m_impl->memory);
     for (const auto& shell : m_shells) all.push_back(shell.get());
     FastBodies fast(*world, m_impl->obstacles, all, m_impl->solved, double(h));  // as Bullet has moved them
     solveNewcomers(*world, double(h));
@@ -195,12 +198,12 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     fast.holdBack();
     m_impl->solved.clear();
     const Vec3 gravity = fromBullet(m_impl->gravity);
-    Sleepers sleepers(*world, m_impl->obstacles, m_shells);
+    Sleepers sleepers(*world, m_impl->obstacles, m_shells, m_impl->memory);
     sleepers.wake(gravity, double(h), std::exchange(m_impl->windChanged, false));
     std::erase_if(all, [](const ShellBody* shell) { return shell->isAsleep(); });
     m_report.awake = static_cast<int>(all.size());
     if (!all.empty())
-        for (Island& island : IslandFinder(*world, m_impl->obstacles, all).find(double(h), false)) {
+        for (Island& island : IslandFinder(*world, m_impl->obstacles, all, m_impl->memory).find(double(h), false)) {
             m_impl->checks.look(island);
             solveIsland(island, double(h));
         }
@@ -238,7 +241,7 @@ void ShellWorld::releaseAnchors(btCollisionWorld& world) {
 /// Shells that were added, or given a velocity, since the last step have no solved velocity to move with: they get one
 /// for the motion that the bodies have already made. Bodies that they push in it have gone too far, or not far enough.
 void ShellWorld::solveNewcomers(btCollisionWorld& world, double h) {
-    std::vector<ShellBody*> newcomers;
+    std::pmr::vector<ShellBody*> newcomers(&m_impl->memory);
     for (const auto& shell : m_shells)
         if (!shell->m_hasVelocity && !shell->isAsleep()) newcomers.push_back(shell.get());
     if (newcomers.empty()) return;
@@ -248,7 +251,7 @@ void ShellWorld::solveNewcomers(btCollisionWorld& world, double h) {
         world.updateSingleAabb(shell->m_proxy.get());
     }
     world.computeOverlappingPairs();
-    for (Island& island : IslandFinder(world, m_impl->obstacles, newcomers).find(h, true)) {
+    for (Island& island : IslandFinder(world, m_impl->obstacles, newcomers, m_impl->memory).find(h, true)) {
         solveIsland(island, h);
         for (const Obstacle& obstacle : island.obstacles)
             if (const auto known = m_impl->solved.find(obstacle.object); known != m_impl->solved.end())
@@ -265,12 +268,13 @@ void ShellWorld::moveShells(btCollisionWorld& world, double h) {
 }
 
 void ShellWorld::solveIsland(Island& island, double h) {
-    std::vector<const ShellBody*> bodies(island.shells.begin(), island.shells.end());
-    std::vector<Shell*> shells;
+    std::pmr::vector<const ShellBody*> bodies(island.shells.begin(), island.shells.end(), &m_impl->memory);
+    std::pmr::vector<Shell*> shells(&m_impl->memory);
     for (ShellBody* shell : island.shells) shells.push_back(&shell->m_shell);
-    std::vector<CoupledBody> coupled;
+    std::pmr::vector<CoupledBody> coupled(&m_impl->memory);
+    coupled.reserve(island.obstacles.size());
     for (const Obstacle& obstacle : island.obstacles) coupled.push_back(obstacle.body);
-    ShellContacts contacts(bodies, island.obstacles, island.pairs);
+    ShellContacts contacts(bodies, island.obstacles, island.pairs, m_impl->contactMemory);
     TimedDetector timed(contacts, m_report.secondsContact);
     const Vec3 gravity = fromBullet(m_world.getGravity());
     IslandInput input;
@@ -287,13 +291,13 @@ void ShellWorld::solveIsland(Island& island, double h) {
     input.clock = &seconds;
     input.team = m_impl->team.get();
     const double start = seconds();
-    const StepReport report = m_impl->solvers[island.shells.front()].solve(input);
+    const StepReport& report = m_impl->solvers[island.shells.front()].solve(input);
     m_report.secondsSolve += seconds() - start;
     m_report.times += report.times;
     accept(island, report, coupled, h * gravity);
 }
 
-void ShellWorld::accept(Island& island, const StepReport& report, const std::vector<CoupledBody>& coupled,
+void ShellWorld::accept(Island& island, const StepReport& report, std::span<const CoupledBody> coupled,
                         const Vec3& pendingGravity) {
     m_report.pcgIterations += report.pcgIterations;
     m_report.solves += report.solves;
@@ -327,7 +331,7 @@ void ShellWorld::accept(Island& island, const StepReport& report, const std::vec
 }
 
 void ShellWorld::carry(ShellBody& shell, int vertex, const Island& island, int body,
-                       const std::vector<CoupledBody>& coupled, const Vec3* anchor) {
+                       std::span<const CoupledBody> coupled, const Vec3* anchor) {
     const Obstacle& obstacle = island.obstacles[body];
     if (standsStill(*obstacle.object) && !anchor) return;
     m_impl->carried.add(shell, vertex, obstacle, coupled[body].twist, anchor);

@@ -57,8 +57,9 @@ void fallAsleep(btCollisionObject& object) {
 
 }  // namespace
 
-Sleepers::Sleepers(btCollisionWorld& world, Obstacles& obstacles, std::span<const std::unique_ptr<ShellBody>> shells)
-    : m_world(world), m_obstacles(obstacles), m_shells(shells) {}
+Sleepers::Sleepers(btCollisionWorld& world, Obstacles& obstacles, std::span<const std::unique_ptr<ShellBody>> shells,
+                   std::pmr::memory_resource& memory)
+    : m_world(world), m_obstacles(obstacles), m_shells(shells), m_memory(memory) {}
 
 bool Sleepers::contains(const ShellRest::Support& support) const {
     const auto& objects = m_world.getCollisionObjectArray();
@@ -121,7 +122,10 @@ bool Sleepers::touches(const ShellBody& shell, btCollisionObject& object, double
     const double speed = obstacle[0].body.freeTwist.head<3>().norm() +
                          obstacle[0].body.freeTwist.tail<3>().norm() * std::min(obstacle[0].body.radius, 1e3);
     if (speed < kSlow) return false;
-    ShellContacts contacts({&shell}, obstacle, {{0, 0}});
+    const ShellBody* const shells[] = {&shell};
+    constexpr std::pair<int, int> kPair[] = {{0, 0}};
+    ShellContacts::Memory memory;
+    ShellContacts contacts(shells, obstacle, kPair, memory);
     const Points* positions = &shell.shell().positions();
     std::vector<Contact> found;
     const double reach = 2.0 * h * speed + shell.contactThickness();
@@ -129,9 +133,11 @@ bool Sleepers::touches(const ShellBody& shell, btCollisionObject& object, double
     return !found.empty();
 }
 
-std::vector<btCollisionObject*> Sleepers::supportsOf(const ShellBody& shell) const {
-    std::vector<btCollisionObject*> supports;
-    for (const auto& contact : shell.contacts()) supports.push_back(contact.object);
+std::pmr::vector<btCollisionObject*> Sleepers::supportsOf(const ShellBody& shell) const {
+    std::pmr::vector<btCollisionObject*> supports(&m_memory);
+    for (const auto& contact : shell.contacts())
+        if (std::find(supports.begin(), supports.end(), contact.object) == supports.end())
+            supports.push_back(contact.object);
     for (const auto& anchor : shell.m_anchors) supports.push_back(anchor.body);
     std::sort(supports.begin(), supports.end());
     supports.erase(std::unique(supports.begin(), supports.end()), supports.end());
@@ -140,7 +146,7 @@ std::vector<btCollisionObject*> Sleepers::supportsOf(const ShellBody& shell) con
 
 void Sleepers::rest(const Vec3& gravity, double h) {
     if (gDisableDeactivation) return;
-    std::vector<Candidate> candidates;
+    std::pmr::vector<Candidate> candidates(&m_memory);
     for (const auto& shell : m_shells) {
         ShellRest& rest = *shell->m_rest;
         if (std::exchange(rest.wakeAsked, false)) rest.place.resize(3, 0);
@@ -178,10 +184,10 @@ bool Sleepers::keepsPlace(ShellBody& shell, double h) const {
 }
 
 /// A shell stays awake with any body that it touches, and that with any shell that it touches.
-void Sleepers::dropRestless(std::vector<Candidate>& candidates) const {
+void Sleepers::dropRestless(std::span<Candidate> candidates) const {
     for (bool changed = true; changed;) {
         changed = false;
-        std::vector<btCollisionObject*> awake;
+        std::pmr::vector<btCollisionObject*> awake(&m_memory);
         for (const Candidate& c : candidates)
             if (!c.ready) awake.insert(awake.end(), c.supports.begin(), c.supports.end());
         for (Candidate& c : candidates) {

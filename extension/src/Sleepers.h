@@ -2,6 +2,7 @@
 #include <LinearMath/btTransform.h>
 
 #include <memory>
+#include <memory_resource>
 #include <span>
 #include <vector>
 
@@ -32,7 +33,8 @@ struct ShellRest {
 /// gDeactivationTime and all that it touches is as calm, together with that.
 class Sleepers {
   public:
-    Sleepers(btCollisionWorld& world, Obstacles& obstacles, std::span<const std::unique_ptr<ShellBody>> shells);
+    Sleepers(btCollisionWorld& world, Obstacles& obstacles, std::span<const std::unique_ptr<ShellBody>> shells,
+             std::pmr::memory_resource& memory);
     /// Wakes shells whose world has changed. `disturbed`: all of them, since the wind has.
     void wake(const Vec3& gravity, double h, bool disturbed);
     /// After the step: counts how long shells have kept their place, and lets them sleep together with their bodies.
@@ -43,19 +45,20 @@ class Sleepers {
   private:
     struct Candidate {
         ShellBody* shell;
-        std::vector<btCollisionObject*> supports;
+        std::pmr::vector<btCollisionObject*> supports;
         bool ready;
     };
     bool keepsPlace(ShellBody& shell, double h) const;
-    void dropRestless(std::vector<Candidate>& candidates) const;
+    void dropRestless(std::span<Candidate> candidates) const;
     bool isDisturbed(const ShellBody& shell, const Vec3& gravity) const;
     void wakeTouched(double h);
     bool touches(const ShellBody& shell, btCollisionObject& object, double h);
-    std::vector<btCollisionObject*> supportsOf(const ShellBody& shell) const;
+    std::pmr::vector<btCollisionObject*> supportsOf(const ShellBody& shell) const;
     bool contains(const ShellRest::Support& support) const;
     btCollisionWorld& m_world;
     Obstacles& m_obstacles;
     std::span<const std::unique_ptr<ShellBody>> m_shells;
+    std::pmr::memory_resource& m_memory;
 };
 
 }  // namespace jacket::bullet

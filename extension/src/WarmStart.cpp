@@ -3,7 +3,6 @@
 #include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
 
 #include <algorithm>
-#include <vector>
 
 #include "Convert.h"
 
@@ -21,33 +20,31 @@ Vec3 impulseOn(const btCollisionObject& body, const btPersistentManifold& manifo
     return sum;
 }
 
-/// Manifolds with what does not move: only that bears all of a load. Another body gives way.
-std::vector<btPersistentManifold*> groundsOf(btDispatcher& dispatcher, const btCollisionObject& body) {
-    std::vector<btPersistentManifold*> grounds;
+/// Calls `visit` for manifolds with what does not move: only that bears all of a load. Another body gives way.
+void forGroundsOf(btDispatcher& dispatcher, const btCollisionObject& body, const auto& visit) {
     for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
         btPersistentManifold* manifold = dispatcher.getManifoldByIndexInternal(m);
         const bool first = manifold->getBody0() == &body;
         if (!first && manifold->getBody1() != &body) continue;
         const btCollisionObject& other = *(first ? manifold->getBody1() : manifold->getBody0());
         if (other.isStaticOrKinematicObject() && other.hasContactResponse() && body.hasContactResponse())
-            grounds.push_back(manifold);
+            visit(*manifold);
     }
-    return grounds;
 }
 
 }  // namespace
 
 void foretellLoad(btDispatcher& dispatcher, const btCollisionObject& body, const Vec3& change) {
     if (change.isZero(0.0)) return;
-    const std::vector<btPersistentManifold*> grounds = groundsOf(dispatcher, body);
     Vec3 total = Vec3::Zero();
-    for (const btPersistentManifold* manifold : grounds) total += impulseOn(body, *manifold);
+    forGroundsOf(dispatcher, body, [&](const auto& manifold) { total += impulseOn(body, manifold); });
     if (!(total.squaredNorm() > 0.0)) return;
     // The ground bears the change along its own direction, every point by its share.
     const double factor = std::max(0.0, 1.0 - change.dot(total) / total.squaredNorm());
-    for (btPersistentManifold* manifold : grounds)
-        for (int k = 0; k < manifold->getNumContacts(); ++k)
-            manifold->getContactPoint(k).m_appliedImpulse *= btScalar(factor);
+    forGroundsOf(dispatcher, body, [&](auto& manifold) {
+        for (int k = 0; k < manifold.getNumContacts(); ++k)
+            manifold.getContactPoint(k).m_appliedImpulse *= btScalar(factor);
+    });
 }
 
 }  // namespace jacket::bullet

@@ -25,7 +25,8 @@ RigidContact onTop(double weight) {
 
 TEST(BodySupports, APileStopsAsOneOnWhatBearsItsLowestBody) {
     std::vector<CoupledBody> bodies{falling(1), falling(10)};
-    bodies[0].supports = {{up(), 0.0, 1e4}};  // the ground; mass and free twist as if it held
+    const BodySupport ground[] = {{up(), 0.0, 1e4}};  // mass and free twist as if it held
+    bodies[0].supports = ground;
     bodies[0].mass += 1e4 * up() * up().transpose();
     bodies[0].freeTwist[1] = -1.0 / 10001;
     BodySupports supports;

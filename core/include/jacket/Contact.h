@@ -25,8 +25,8 @@ struct CoupledBody {
     Vec6 startTwist = Vec6::Zero();  ///< as it is when the step begins: what contacts bounce from
     double radius = 0.0;             ///< of a ball around `position` that holds the body [m]
     double inner = 1e300;  ///< of a ball that fits into its thinnest piece: contacts of faster motion are swept [m]
-    std::vector<BodySupport> supports{};
-    const void* key = nullptr;    ///< the same from step to step: whose contacts to remember
+    std::span<const BodySupport> supports{};  ///< kept by the caller
+    const void* key = nullptr;                ///< the same from step to step: whose contacts to remember
     bool prescribed = false;      ///< static, kinematic or sleeping: moves with freeTwist whatever the shells do
     Vec6 twist = Vec6::Zero();    ///< out: solved twist at the end of the step, to the solve's tolerance
     Vec6 impulse = Vec6::Zero();  ///< out: what the shells gave it, exactly, about its centre of mass [N s, N m s]

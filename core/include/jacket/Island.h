@@ -32,7 +32,8 @@ class IslandSolver {
     ~IslandSolver();
     IslandSolver(IslandSolver&&) noexcept;
     IslandSolver& operator=(IslandSolver&&) noexcept;
-    StepReport solve(const IslandInput& input);
+    /// The report stays as it is until the next solve.
+    const StepReport& solve(const IslandInput& input);
 
   private:
     struct Impl;

@@ -31,22 +31,23 @@ void ContactResponse::moveToEnd(const IslandVelocities& solved, const Points& y)
 /// What is inside a body at the end of the solved motion, the deepest first, into m_found.
 void ContactResponse::findAtEnd(const IslandVelocities& solved, const Points& y) {
     moveToEnd(solved, y);
-    std::vector<const Points*> positions;
-    for (const Points& end : m_end) positions.push_back(&end);
+    m_endPoses.clear();
+    for (const Points& end : m_end) m_endPoses.push_back(&end);
     m_found.clear();
-    m_input.contacts->find({positions, m_endTwists, m_input.h}, -m_vertexSlop, -m_faceSlop, m_found);
+    m_input.contacts->find({m_endPoses, m_endTwists, m_input.h}, -m_vertexSlop, -m_faceSlop, m_found);
     std::sort(m_found.begin(), m_found.end(), [](const Contact& a, const Contact& b) { return a.gap < b.gap; });
 }
 
 /// The same for the solved motion, into m_found.
 void ContactResponse::sweepToEnd() {
-    std::vector<const Points*> start, end;
+    m_startPoses.clear();
+    m_endPoses.clear();
     for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
-        start.push_back(&m_input.shells[k]->positions());
-        end.push_back(&m_end[k]);
+        m_startPoses.push_back(&m_input.shells[k]->positions());
+        m_endPoses.push_back(&m_end[k]);
     }
     m_found.clear();
-    m_input.contacts->sweep({start, end, m_endTwists, m_fast, m_input.h}, m_found);
+    m_input.contacts->sweep({m_startPoses, m_endPoses, m_endTwists, m_fast, m_input.h}, m_found);
 }
 
 bool ContactResponse::passes(const IslandVelocities& solved, const Points& y) {
@@ -254,15 +255,15 @@ double ContactResponse::endGap(const Touch& touch, const IslandVelocities& solve
 /// have their turn several times.
 void ContactResponse::pushOut(Points& v, std::vector<ContactImpulse>& impulses) {
     if (!m_input.contacts || !isQuick()) return;
-    std::vector<Push> pushes = whatToPush(v);
-    std::map<int, Vec3> moved;
+    findPushes(v);
+    m_pushed.clear();
     for (int turn = 0; turn < kMostTurns; ++turn) {
         bool isInside = false;
-        for (Push& one : pushes) isInside |= push(one, moved);
+        for (Push& one : m_pushes) isInside |= push(one);
         if (!isInside) break;
     }
     m_deepestGap = 0.0;
-    for (const Push& one : pushes) {
+    for (const Push& one : m_pushes) {
         const Contact& contact = *one.contact;
         m_deepestGap = std::min(m_deepestGap, one.left);
         if (one.impulse == 0.0) continue;
@@ -270,22 +271,22 @@ void ContactResponse::pushOut(Points& v, std::vector<ContactImpulse>& impulses) 
         if (contact.isVertex())
             m_memory[keyOf(contact)] = {one.impulse, 0.0, false, {}, contact.point, true, contact.vertices};
     }
-    for (const auto& [vertex, by] : moved) v.col(vertex) += by / m_input.h;
+    for (const auto& [vertex, by] : m_pushed) v.col(vertex) += by / m_input.h;
 }
 
 /// What ends inside a body, and the other walls near the same vertices. Velocities may have changed since the end of
 /// the step was looked at.
-std::vector<ContactResponse::Push> ContactResponse::whatToPush(const Points& v) const {
-    std::vector<Push> pushes;
-    std::set<int> found;
-    std::multimap<int, const Contact*> near;  // of each vertex
+void ContactResponse::findPushes(const Points& v) {
+    m_pushes.clear();
+    std::pmr::set<int> found(&m_pool);
+    std::pmr::multimap<int, const Contact*> near(&m_pool);  // of each vertex
     for (const Contact& contact : m_found) {
         const int touch = touchOf(contact);
         double lacks = missing(contact, touch);
         for (int a = 0; a < 3; ++a) lacks += contact.weights[a] * contact.normal.dot(sinceFound(contact, a, v));
         if (lacks > -(contact.isVertex() ? m_vertexSlop : m_faceSlop) || isHeld(contact)) continue;
         const double by = std::min(-lacks, kMostPush * m_edge[contact.shell]);
-        pushes.push_back({&contact, by, lacks + by});
+        m_pushes.push_back({&contact, by, lacks + by});
         if (touch >= 0) found.insert(touch);
         for (int a = 0; a < (contact.isVertex() ? 1 : 3); ++a) near.emplace(globalVertex(contact, a), &contact);
     }
@@ -301,9 +302,8 @@ std::vector<ContactResponse::Push> ContactResponse::whatToPush(const Points& v) 
         if (gap < -m_vertexSlop && !isValley) continue;  // off the wall's end
         const double lacks = gap + contact.normal.dot(sinceFound(contact, 0, v));
         const double by = std::min(-lacks, kMostPush * m_edge[contact.shell]);
-        if (first != last || lacks < -m_vertexSlop) pushes.push_back({&contact, by});
+        if (first != last || lacks < -m_vertexSlop) m_pushes.push_back({&contact, by});
     }
-    return pushes;
 }
 
 /// How far a vertex ends from a wall that the start found, or that holds it, as m_found saw the end; infinite where
@@ -331,14 +331,14 @@ bool ContactResponse::isHeld(const Contact& contact) const {
 }
 
 /// Moves a contact's point out along its normal, besides what its vertices have been moved by. Whether it had to.
-bool ContactResponse::push(Push& one, std::map<int, Vec3>& moved) const {
+bool ContactResponse::push(Push& one) {
     const Contact& contact = *one.contact;
     const Shell& shell = *m_input.shells[contact.shell];
     const double damped = 1.0 + m_input.h * shell.material().massDamping;
     bool isInside = false;
     for (int a = 0; a < (contact.isVertex() ? 1 : 3); ++a) {
         if (contact.weights[a] == 0.0) continue;
-        Vec3& before = moved.try_emplace(globalVertex(contact, a), Vec3::Zero()).first->second;
+        Vec3& before = m_pushed.try_emplace(globalVertex(contact, a), Vec3::Zero()).first->second;
         const double missing = one.by * contact.weights[a] / contact.weights.squaredNorm() - before.dot(contact.normal);
         if (missing <= 0.0) continue;
         isInside |= missing > m_vertexSlop;

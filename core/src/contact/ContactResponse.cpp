@@ -102,13 +102,13 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
         speed = std::max(speed, body.freeTwist.head<3>().norm() + body.freeTwist.tail<3>().norm() * body.radius);
     const double reach = 2.0 * input.h * (speed + input.h * input.gravity.norm()) + 10.0 * m_vertexSlop;
 
-    std::vector<const Points*> positions;
-    for (const Shell* shell : input.shells) positions.push_back(&shell->positions());
-    const std::vector<Vec6> still(input.bodies.size(), Vec6::Zero());
+    m_startPoses.clear();
+    for (const Shell* shell : input.shells) m_startPoses.push_back(&shell->positions());
+    m_still.assign(input.bodies.size(), Vec6::Zero());
     m_found.clear();
-    input.contacts->find({positions, still, 0.0}, reach, m_memory.empty() ? kNone : 10.0 * m_vertexSlop, m_found);
-    const std::map<int, double> room = roomBesideFaces();
-    for (const Contact& contact : m_found) addAtStart(contact, room, y);
+    input.contacts->find({m_startPoses, m_still, 0.0}, reach, m_memory.empty() ? kNone : 10.0 * m_vertexSlop, m_found);
+    findRoomBesideFaces();
+    for (const Contact& contact : m_found) addAtStart(contact, y);
     findFast();
     if (isQuick() && (isAnyBouncy() || m_anyFast)) m_care = kInFull;
     if (m_anyFast) sweepAtStart();
@@ -144,14 +144,14 @@ double ContactResponse::creepSpeed() const {
     return 2e-5 * std::sqrt(std::max(m_input.gravity.norm(), 1e-3) * least);
 }
 
-void ContactResponse::addAtStart(const Contact& contact, const std::map<int, double>& room, Points& y) {
+void ContactResponse::addAtStart(const Contact& contact, Points& y) {
     Touch touch = makeTouch(contact);
     touch.startGap = contact.gap;
     const Memory* memory = remembered(contact);
     if (!contact.isVertex() && !memory) return;  // found at the end of the step if it matters
     if (memory && memory->offset > 0.0) {
-        const auto faces = room.find(globalVertex(contact, 0));
-        const double most = faces == room.end() ? std::numeric_limits<double>::infinity() : faces->second;
+        const auto faces = m_room.find(globalVertex(contact, 0));
+        const double most = faces == m_room.end() ? std::numeric_limits<double>::infinity() : faces->second;
         touch.offset = memory->offset - std::clamp((1.0 - kOffsetDecay) * memory->offset, 0.0, std::max(0.0, most));
     }
     touch.contact.gap -= touch.offset;
@@ -186,16 +186,15 @@ bool ContactResponse::isRather(const Touch& touch, const Touch& other, const Mem
 }
 
 /// Per vertex the least gap of the faces and edges around it that have been found: as far as it may come down.
-std::map<int, double> ContactResponse::roomBesideFaces() const {
-    std::map<int, double> room;
+void ContactResponse::findRoomBesideFaces() {
+    m_room.clear();
     for (const Contact& contact : m_found) {
         if (contact.isVertex()) continue;
         for (int a = 0; a < 3; ++a) {
-            const auto [known, fresh] = room.try_emplace(globalVertex(contact, a), contact.gap);
+            const auto [known, fresh] = m_room.try_emplace(globalVertex(contact, a), contact.gap);
             if (!fresh) known->second = std::min(known->second, contact.gap);
         }
     }
-    return room;
 }
 
 /// Bodies that move farther relative to some vertex than they are thick.
@@ -215,17 +214,13 @@ void ContactResponse::findFast() {
 /// Contacts that only the motion of the step shows.
 void ContactResponse::sweepAtStart() {
     m_end.resize(m_input.shells.size());
-    std::vector<const Points*> start, end;
     for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
         const Points& x = m_input.shells[k]->positions();
         m_end[k] = x + m_input.h * m_expected->middleCols(m_offsets[k], x.cols());
-        start.push_back(&x);
-        end.push_back(&m_end[k]);
     }
-    std::vector<Vec6> twists;
-    for (const CoupledBody& body : m_input.bodies) twists.push_back(body.freeTwist);
-    m_found.clear();
-    m_input.contacts->sweep({start, end, twists, m_fast, m_input.h}, m_found);
+    m_endTwists.clear();
+    for (const CoupledBody& body : m_input.bodies) m_endTwists.push_back(body.freeTwist);
+    sweepToEnd();
     for (const Contact& contact : m_found) {
         const auto [known, fresh] = m_index.try_emplace(keyOf(contact), static_cast<int>(m_touches.size()));
         if (!fresh) continue;
@@ -240,15 +235,15 @@ void ContactResponse::sweepAtStart() {
 /// together they would be dragged to its surface, and a light body thrown about. Those that do touch are found in later
 /// rounds.
 void ContactResponse::keepEarliest() {
-    std::vector<double> earliest(m_input.bodies.size(), 2.0 * m_input.h);
+    m_earliest.assign(m_input.bodies.size(), 2.0 * m_input.h);
     const auto isRemembered = [&](const Touch& t) { return remembered(t.contact) != nullptr; };
     for (const Touch& touch : m_touches)
         if (touch.active && touch.dynamicBody >= 0)
-            earliest[touch.contact.body] =
-                std::min(earliest[touch.contact.body], isRemembered(touch) ? 0.0 : timeOfTouch(touch));
+            m_earliest[touch.contact.body] =
+                std::min(m_earliest[touch.contact.body], isRemembered(touch) ? 0.0 : timeOfTouch(touch));
     for (Touch& touch : m_touches)
         if (touch.active && touch.dynamicBody >= 0 && !isRemembered(touch))
-            touch.active = timeOfTouch(touch) <= earliest[touch.contact.body] + 0.02 * m_input.h;
+            touch.active = timeOfTouch(touch) <= m_earliest[touch.contact.body] + 0.02 * m_input.h;
 }
 
 /// When a contact closes if nothing else happens, from the start of the step; infinite if it does not [s].
@@ -275,8 +270,9 @@ void ContactResponse::alter(Touch& touch, Points& y) const {
     touch.allowedGap = std::min(0.0, c.gap + by);
 }
 
-std::vector<VertexConstraint> ContactResponse::holdConstraints() const {
-    std::vector<VertexConstraint> constraints;
+/// Constraints of what is pinned, guided or anchored.
+void ContactResponse::holdVertices() {
+    m_constraints.clear();
     for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
         const Shell& shell = *m_input.shells[k];
         if (shell.pinCount() == 0) continue;
@@ -286,7 +282,7 @@ std::vector<VertexConstraint> ContactResponse::holdConstraints() const {
             c.free = shell.freedom(i);
             if (shell.isPinned(i))
                 c.carried = (shell.pinTarget(i) - shell.positions().col(i) - m_y->col(m_offsets[k] + i)) / m_stepOf[k];
-            constraints.push_back(c);
+            m_constraints.push_back(c);
         }
     }
     for (const auto& anchor : m_input.anchors) {
@@ -297,38 +293,38 @@ std::vector<VertexConstraint> ContactResponse::holdConstraints() const {
         c.arm = anchor.point - body.position;
         c.z = (anchor.point - shell.positions().col(anchor.vertex)) / m_input.h;
         if (body.prescribed) c.carried = pointVelocity(body.freeTwist, c.arm);
-        constraints.push_back(c);
+        m_constraints.push_back(c);
     }
-    return constraints;
 }
 
 void ContactResponse::writeTo(CoupledSystem& system) {
     for (const auto& filter : m_filters) m_filterOf[globalVertex(m_touches[filter.touches[0]].contact, 0)] = -1;
     m_filters.clear();
-    std::vector<VertexConstraint> constraints = holdConstraints();
-    std::vector<SoftRow> rows;
+    holdVertices();
+    m_rows.clear();
     for (std::size_t i = 0; i < m_touches.size(); ++i) {
         Touch& touch = m_touches[i];
-        touch.isRow = touch.active && !joinFilter(static_cast<int>(i), constraints);
+        touch.isRow = touch.active && !joinFilter(static_cast<int>(i));
     }
     findJams();
     for (Touch& touch : m_touches)  // after them, as what holds their vertices matters
-        if (touch.isRow) rows.push_back(makeRow(touch, system));
-    for (auto& filter : m_filters) finishFilter(filter, constraints[filter.constraint], rows);
-    system.setContacts(std::move(constraints), std::move(rows));
+        if (touch.isRow) m_rows.push_back(makeRow(touch, system));
+    for (auto& filter : m_filters) finishFilter(filter, m_constraints[filter.constraint]);
+    system.setContacts(m_constraints, m_rows);
 }
 
-bool ContactResponse::joinFilter(int index, std::vector<VertexConstraint>& constraints) {
+bool ContactResponse::joinFilter(int index) {
     const Touch& touch = m_touches[index];
     const int vertex = globalVertex(touch.contact, 0);
     if (!touch.contact.isVertex() || m_held[vertex]) return false;
     if (m_filterOf[vertex] < 0) {
         m_filterOf[vertex] = static_cast<int>(m_filters.size());
-        m_filters.push_back({.constraint = static_cast<int>(constraints.size()), .count = 1, .touches = {index, 0, 0}});
+        m_filters.push_back(
+            {.constraint = static_cast<int>(m_constraints.size()), .count = 1, .touches = {index, 0, 0}});
         VertexConstraint c{.vertex = vertex, .body = touch.dynamicBody};
         c.arm = touch.arm;
         c.carried = touch.carried;
-        constraints.push_back(c);
+        m_constraints.push_back(c);
         return true;
     }
     VertexFilter& filter = m_filters[m_filterOf[vertex]];
@@ -359,12 +355,12 @@ void ContactResponse::jam(Touch& touch, const Touch& other) const {
 /// Soft rows that share vertices with contacts, or are close to rows, from the other side.
 void ContactResponse::findJams() {
     constexpr double kClose = 0.6;  // of an edge
-    std::vector<Touch*> rows;
+    m_rowsAtWalls.clear();
     for (Touch& touch : m_touches) {
         touch.jammed = false;
-        if (touch.isRow && touch.dynamicBody < 0) rows.push_back(&touch);
+        if (touch.isRow && touch.dynamicBody < 0) m_rowsAtWalls.push_back(&touch);
     }
-    for (Touch* row : rows) {
+    for (Touch* row : m_rowsAtWalls) {
         const Contact& c = row->contact;
         for (int a = 0; a < 3; ++a) {
             const int filter = m_filterOf[globalVertex(c, a)];
@@ -372,13 +368,13 @@ void ContactResponse::findJams() {
             for (int k = 0; k < m_filters[filter].count; ++k) jam(*row, m_touches[m_filters[filter].touches[k]]);
             if (m_filters[filter].opposite >= 0) jam(*row, m_touches[m_filters[filter].opposite]);
         }
-        for (const Touch* other : rows)
+        for (const Touch* other : m_rowsAtWalls)
             if (other->contact.shell == c.shell && (other->contact.point - c.point).norm() < kClose * m_edge[c.shell])
                 jam(*row, *other);
     }
 }
 
-void ContactResponse::finishFilter(VertexFilter& filter, VertexConstraint& constraint, std::vector<SoftRow>& rows) {
+void ContactResponse::finishFilter(VertexFilter& filter, VertexConstraint& constraint) {
     Touch& first = m_touches[filter.touches[0]];
     if (filter.opposite >= 0) {
         jam(first, m_touches[filter.opposite]);
@@ -412,8 +408,8 @@ void ContactResponse::finishFilter(VertexFilter& filter, VertexConstraint& const
     friction.stiffness = (constraint.free * friction.stiffness * constraint.free).eval();
     friction.load = (constraint.free * friction.load).eval();
     if (friction.stiffness.isZero(0.0) && friction.load.isZero(0.0)) return;
-    filter.friction = static_cast<int>(rows.size());
-    rows.push_back(friction);
+    filter.friction = static_cast<int>(m_rows.size());
+    m_rows.push_back(friction);
 }
 
 double ContactResponse::vertexStiffness(const CoupledSystem& system, const Touch& touch) const {
@@ -527,8 +523,10 @@ void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelo
         const Vec3 total = -solved.unfiltered.col(system.constraints()[filter.constraint].vertex);
         Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3> normals(3, filter.count);
         for (int k = 0; k < filter.count; ++k) normals.col(k) = m_touches[filter.touches[k]].contact.normal;
-        const Eigen::MatrixXd gram = normals.transpose() * normals;
-        const Eigen::VectorXd along = gram.fullPivLu().solve(normals.transpose() * total);
+        using Gram = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
+        const Gram gram = normals.transpose() * normals;
+        const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> along =
+            gram.fullPivLu().solve(normals.transpose() * total);
         for (int k = 0; k < filter.count; ++k) {
             Touch& touch = m_touches[filter.touches[k]];
             touch.normalImpulse = along[k];
@@ -571,8 +569,9 @@ void ContactResponse::raiseMultiplier(Touch& touch) const {
     touch.missed = missing;
 }
 
-std::vector<double> ContactResponse::speedsBeside(const Points& a, const Points& b) const {
-    std::vector<double> speeds(m_input.bodies.size(), -1.0);
+const std::vector<double>& ContactResponse::speedsBeside(const Points& a, const Points& b) {
+    std::vector<double>& speeds = m_speeds;
+    speeds.assign(m_input.bodies.size(), -1.0);
     for (const Touch& touch : m_touches) {
         if (touch.impulse.isZero(0.0)) continue;
         double& most = speeds[touch.contact.body];

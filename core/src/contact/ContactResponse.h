@@ -1,6 +1,7 @@
 #pragma once
 #include <limits>
 #include <map>
+#include <memory_resource>
 #include <set>
 #include <tuple>
 #include <vector>
@@ -56,7 +57,7 @@ class ContactResponse {
     /// Contacts that carried an impulse; remembers them for the next step.
     void finish(std::vector<ContactImpulse>& impulses);
     /// Of each body the speed of the fastest vertex that touched it in the last solve, by either velocities, -1: none.
-    std::vector<double> speedsBeside(const Points& a, const Points& b) const;
+    const std::vector<double>& speedsBeside(const Points& a, const Points& b);
     /// What finish remembers then is not of this body.
     void forget(int body) { m_forgotten.insert(body); }
     double slop() const { return m_vertexSlop; }
@@ -153,16 +154,16 @@ class ContactResponse {
     void moveToEnd(const IslandVelocities& solved, const Points& y);
     void sweepToEnd();
     bool closeFirst(int round);
-    std::map<int, double> roomBesideFaces() const;
-    void addAtStart(const Contact& contact, const std::map<int, double>& room, Points& y);
+    void findRoomBesideFaces();
+    void addAtStart(const Contact& contact, Points& y);
     bool isRather(const Touch& touch, const Touch& other, const Memory* memory) const;
     void keepEarliest();
     void alter(Touch& touch, Points& y) const;
-    std::vector<VertexConstraint> holdConstraints() const;
-    bool joinFilter(int touch, std::vector<VertexConstraint>& constraints);
+    void holdVertices();
+    bool joinFilter(int touch);
     void jam(Touch& touch, const Touch& other) const;
     void findJams();
-    void finishFilter(VertexFilter& filter, VertexConstraint& constraint, std::vector<SoftRow>& rows);
+    void finishFilter(VertexFilter& filter, VertexConstraint& constraint);
     SoftRow makeRow(Touch& touch, const CoupledSystem& system) const;
     bool isBetweenBodies(const Touch& touch) const;
     double pinchedMass(const Touch& touch) const;
@@ -195,10 +196,10 @@ class ContactResponse {
     bool isAnyStiff() const;
     double creepSpeed() const;
     void findAtEnd(const IslandVelocities& solved, const Points& y);
-    std::vector<Push> whatToPush(const Points& v) const;
+    void findPushes(const Points& v);
     double gapBefore(const Touch& touch) const;
     Vec3 sinceFound(const Contact& contact, int corner, const Points& v) const;
-    bool push(Push& one, std::map<int, Vec3>& moved) const;
+    bool push(Push& one);
     bool isHeld(const Contact& contact) const;
     bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
     int touchOf(const Contact& contact) const;
@@ -209,13 +210,14 @@ class ContactResponse {
     double endGap(const Touch& touch, const IslandVelocities& solved) const;
     int globalVertex(const Contact& c, int corner) const { return m_offsets[c.shell] + c.vertices[corner]; }
 
+    std::pmr::unsynchronized_pool_resource m_pool;  ///< what a step gives back, the next one takes
     IslandInput m_input;
     const Points *m_expected = nullptr, *m_y = nullptr;
     std::vector<int> m_offsets, m_dynamicIndex;
     std::vector<double> m_stepOf;
     std::vector<Touch> m_touches;
-    std::map<Key, int> m_index;
-    std::map<Key, Memory> m_memory;
+    std::pmr::map<Key, int> m_index{&m_pool};
+    std::pmr::map<Key, Memory> m_memory{&m_pool};
     double m_memoryStep = 0.0;
     std::vector<char> m_held;       ///< pinned or anchored
     std::vector<double> m_edge;     ///< mean edge length of each shell [m]
@@ -224,15 +226,26 @@ class ContactResponse {
     std::vector<char> m_fast;       ///< per body: may pass a shell within the step
     bool m_anyFast = false;
     std::vector<Contact> m_found;
-    std::map<int, Vec3> m_raised;  ///< by what their own contacts take vertices out of bodies in this round [m]
-    std::set<int> m_claimed;       ///< vertices of the soft rows that this round has added
-    std::set<int> m_forgotten;     ///< bodies
+    std::pmr::map<int, double> m_room{&m_pool};  ///< of vertices: see findRoomBesideFaces [m]
+    std::pmr::map<int, Vec3> m_raised{
+        &m_pool};  ///< by what their own contacts take vertices out of bodies in this round [m]
+    std::pmr::set<int> m_claimed{&m_pool};    ///< vertices of the soft rows that this round has added
+    std::pmr::set<int> m_forgotten{&m_pool};  ///< bodies
     Care m_care = kInFull;
     double m_vertexSlop = 0.0, m_faceSlop = 0.0, m_deepestGap = 0.0;
     double m_creep = 0.0;  ///< sliding speed below which friction may hold less than its limit, where isQuick() [m/s]
     int m_frictionRounds = 0, m_mostFrictionRounds = 0;
     std::vector<VertexFilter> m_filters;
     std::vector<int> m_filterOf;  ///< per vertex, -1: none
+    std::vector<VertexConstraint> m_constraints;
+    std::vector<SoftRow> m_rows;
+    std::vector<Touch*> m_rowsAtWalls;  ///< soft rows of prescribed bodies: see findJams
+    std::vector<Push> m_pushes;
+    std::pmr::map<int, Vec3> m_pushed{&m_pool};           ///< by what pushOut has moved vertices [m]
+    std::vector<const Points*> m_startPoses, m_endPoses;  ///< of each shell
+    std::vector<Vec6> m_still;                            ///< twists of bodies that do not move
+    std::vector<double> m_speeds;                         ///< of each body: see speedsBeside [m/s]
+    std::vector<double> m_earliest;                       ///< of each body: see keepEarliest [s]
 };
 
 }  // namespace jacket

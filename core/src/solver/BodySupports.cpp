@@ -59,7 +59,8 @@ void BodySupports::add(const Pair& pair, double sign) {
 /// Of bodies that couplings join: those of their common mass matrix. Only where there are pairs; free twists that were
 /// given agree with the given couplings.
 void BodySupports::solveFreeTwists() {
-    std::vector<int> place(m_mass.size(), -1);
+    std::vector<int>& place = m_place;
+    place.assign(m_mass.size(), -1);
     int size = 0;
     const auto take = [&](int body) {
         if (place[body] >= 0) return;
@@ -67,8 +68,9 @@ void BodySupports::solveFreeTwists() {
         size += 6;
     };
     for (const BodyCoupling& c : m_couplings) take(c.a), take(c.b);
-    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(size, size);
-    Eigen::VectorXd momentum(size);
+    auto& [matrix, momentum, factor] = m_common[size];
+    matrix.setZero(size, size);
+    momentum.resize(size);
     for (std::size_t b = 0; b < m_mass.size(); ++b) {
         if (place[b] < 0) continue;
         matrix.block<6, 6>(place[b], place[b]) = m_mass[b];
@@ -78,7 +80,8 @@ void BodySupports::solveFreeTwists() {
         matrix.block<6, 6>(place[c.a], place[c.b]) += c.mass;
         matrix.block<6, 6>(place[c.b], place[c.a]) += c.mass.transpose();
     }
-    momentum = matrix.llt().solve(momentum);
+    factor.compute(matrix);
+    factor.solveInPlace(momentum);
     for (std::size_t b = 0; b < m_mass.size(); ++b)
         if (place[b] >= 0) m_freeTwist[b] = momentum.segment<6>(place[b]);
 }
@@ -97,8 +100,9 @@ double BodySupports::lightest(int body) const {
 
 /// Of each body what it rests on, or rests on it, bears most [N s]. A solve is only as exact as its largest impulses
 /// let it be: what it leaves of them is no pull.
-std::vector<double> BodySupports::loads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) const {
-    std::vector<double> most(m_mass.size(), 0.0);
+void BodySupports::findLoads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) {
+    std::vector<double>& most = m_loads;
+    most.assign(m_mass.size(), 0.0);
     for (const auto& [body, contact, hold] : m_supports)
         if (hold.holds)
             most[body] = std::max(most[body], contact.weight * (contact.velocity - contact.row.dot(w.col(body))));
@@ -108,12 +112,12 @@ std::vector<double> BodySupports::loads(const Eigen::Matrix<double, 6, Eigen::Dy
         most[contact.a] = std::max(most[contact.a], load);
         most[contact.b] = std::max(most[contact.b], load);
     }
-    return most;
 }
 
 bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, double kick) {
     bool changed = false;
-    const std::vector<double> load = loads(w);
+    findLoads(w);
+    const std::vector<double>& load = m_loads;
     for (Support& support : m_supports) {
         const auto& [row, velocity, weight] = support.contact;
         const double opening = row.dot(w.col(support.body)) - velocity;

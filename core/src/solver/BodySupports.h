@@ -1,4 +1,6 @@
 #pragma once
+#include <Eigen/Cholesky>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -39,7 +41,7 @@ class BodySupports {
 
     void add(const Pair& pair, double sign);
     double lightest(int body) const;
-    std::vector<double> loads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) const;
+    void findLoads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w);
     void solveFreeTwists();
 
     std::vector<Support> m_supports;
@@ -48,6 +50,14 @@ class BodySupports {
     std::vector<Vec6> m_momentum, m_freeTwist;
     std::vector<BodyCoupling> m_couplings;  ///< those that were given, then one for each pair
     std::size_t m_givenCouplings = 0;
+    std::vector<double> m_loads;  ///< see findLoads [N s]
+    std::vector<int> m_place;     ///< of each body in the common mass matrix, -1: it stands alone
+    struct CommonMass {
+        Eigen::MatrixXd matrix;
+        Eigen::VectorXd momentum;
+        Eigen::LLT<Eigen::MatrixXd> factor;
+    };
+    std::map<int, CommonMass> m_common;  ///< by size: kept for its memory
 };
 
 }  // namespace jacket

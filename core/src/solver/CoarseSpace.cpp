@@ -281,20 +281,20 @@ void CoarseSpace::findTargets(const CompactMatrix& matrix) {
 }
 
 void CoarseSpace::placeArms(const CompactMatrix& matrix, const Points& positions) {
-    std::vector<Vec3> centre(patchCount(), Vec3::Zero());
-    std::vector<double> size(patchCount(), 0.0);
+    m_centre.assign(patchCount(), Vec3::Zero());
+    m_size.assign(patchCount(), 0.0);
     const auto members = [&](int patch) { return std::max(1, m_patchStart[patch + 1] - m_patchStart[patch]); };
     const std::vector<int>& rowOf = matrix.rowOf();
-    for (int i = 0; i < matrix.size(); ++i) centre[m_patchOf[rowOf[i]]] += positions.col(i);
-    for (int p = 0; p < patchCount(); ++p) centre[p] /= members(p);
+    for (int i = 0; i < matrix.size(); ++i) m_centre[m_patchOf[rowOf[i]]] += positions.col(i);
+    for (int p = 0; p < patchCount(); ++p) m_centre[p] /= members(p);
     for (int i = 0; i < matrix.size(); ++i) {
         const int p = m_patchOf[rowOf[i]];
-        size[p] += (positions.col(i) - centre[p]).squaredNorm();
+        m_size[p] += (positions.col(i) - m_centre[p]).squaredNorm();
     }
-    for (int p = 0; p < patchCount(); ++p) size[p] = std::max(std::sqrt(size[p] / members(p)), 1e-30);
+    for (int p = 0; p < patchCount(); ++p) m_size[p] = std::max(std::sqrt(m_size[p] / members(p)), 1e-30);
     for (int i = 0; i < matrix.size(); ++i) {
         const int p = m_patchOf[rowOf[i]];
-        const Vec3 arm = (positions.col(i) - centre[p]) / size[p];
+        const Vec3 arm = (positions.col(i) - m_centre[p]) / m_size[p];
         float* to = m_arms.data() + 4 * rowOf[i];
         for (int c = 0; c < 3; ++c) to[c] = static_cast<float>(arm[c]);
         to[3] = 1.0f;

@@ -50,6 +50,8 @@ class CoarseSpace {
     std::vector<double> m_sums;        ///< P^T A P of the blocks: 6 columns of (3, 0, 3, 0) a block
     std::vector<float> m_moments;      ///< of the scalars: sum s (r_i, 1) (r_j, 1)^T a block
     std::vector<double> m_besideSums;  ///< the last entry of each moment, which must add up to 0
+    std::vector<Vec3> m_centre;        ///< of each patch [m]
+    std::vector<double> m_size;        ///< its size: root mean square of its rows' distances from the centre [m]
     mutable std::vector<double> m_coarse;
 };
 

@@ -7,21 +7,6 @@
 #include "solver/CompactShell.h"
 
 namespace jacket {
-namespace {
-
-/// For every body the first body of its group.
-std::vector<int> groupLeaders(const CoupledSystem& system) {
-    std::vector<int> leader(system.bodyCount());
-    std::iota(leader.begin(), leader.end(), 0);
-    for (const auto& coupling : system.couplings()) {
-        const auto [low, high] = std::minmax(leader[coupling.a], leader[coupling.b]);
-        std::replace(leader.begin(), leader.end(), int(high), int(low));
-    }
-    return leader;
-}
-
-}  // namespace
-
 void CoupledPreconditioner::build(const CoupledSystem& system, Preconditioner kind) {
     m_kind = system.precision() == Precision::Single ? Preconditioner::IncompleteCholesky : kind;
     m_factors.resize(system.shells().size());
@@ -143,7 +128,8 @@ void CoupledPreconditioner::filterBlocks(const CoupledSystem& system, const Coup
 }
 
 void CoupledPreconditioner::updateBodies(const CoupledSystem& system) {
-    std::vector<Mat6> blocks = system.mass();
+    std::vector<Mat6>& blocks = m_bodyBlocks;
+    blocks = system.mass();
     for (const auto& part : system.shells()) {
         for (int i = 0; i < part.matrix->size(); ++i) {
             const VertexConstraint* ci = system.constraintOf(i + part.offset);
@@ -161,18 +147,19 @@ void CoupledPreconditioner::updateBodies(const CoupledSystem& system) {
         if (row.body >= 0) blocks[row.body] += pointStiffness(row.stiffness, row.arm);
     m_bodies.resize(blocks.size());
     for (std::size_t b = 0; b < blocks.size(); ++b) m_bodies[b].compute(blocks[b]);
-    m_groups.clear();
-    if (!system.couplings().empty()) factorGroups(system, blocks);
-    m_columns.clear();
-    if (isComplete() && system.bodyCount() > 0) eliminateShells(system);
+    m_groupCount = 0;
+    if (!system.couplings().empty()) factorGroups(system);
+    m_isEliminating = isComplete() && system.bodyCount() > 0;
+    if (m_isEliminating) eliminateShells(system);
 }
 
 /// C - B^T A^-1 B of the bodies, A and B those of the shells that are factored completely: a stiff shell and a body
 /// that move as one have little inertia beside what each has against the other.
 void CoupledPreconditioner::eliminateShells(const CoupledSystem& system) {
     const int size = 6 * system.bodyCount();
-    Eigen::MatrixXd schur(size, size);
-    CoupledVector unit;
+    Eigen::MatrixXd& schur = m_schurMatrix;
+    schur.resize(size, size);
+    CoupledVector& unit = m_unit;
     unit.resize(system.vertexCount(), system.bodyCount());
     m_columns.resize(size);
     m_solved.resize(size);
@@ -207,28 +194,53 @@ double CoupledPreconditioner::alongComplete(const CoupledSystem& system, const P
     return sum;
 }
 
-void CoupledPreconditioner::factorGroups(const CoupledSystem& system, const std::vector<Mat6>& blocks) {
-    const std::vector<int> leader = groupLeaders(system);
-    std::vector<int> place(leader.size());
-    for (int first = 0; first < system.bodyCount(); ++first) {
-        BodyGroup group;
-        for (int b = first; b < system.bodyCount(); ++b) {
-            if (leader[b] != first) continue;
-            place[b] = 6 * static_cast<int>(group.bodies.size());
-            group.bodies.push_back(b);
-        }
-        if (group.bodies.size() < 2) continue;
-        const auto size = 6 * static_cast<Eigen::Index>(group.bodies.size());
-        Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(size, size);
-        for (const int b : group.bodies) matrix.block<6, 6>(place[b], place[b]) = blocks[b];
-        for (const auto& c : system.couplings()) {
-            if (leader[c.a] != first) continue;
-            matrix.block<6, 6>(place[c.a], place[c.b]) += c.mass;
-            matrix.block<6, 6>(place[c.b], place[c.a]) += c.mass.transpose();
-        }
-        group.factor.compute(matrix);
-        m_groups.push_back(std::move(group));
+/// For every body the first body of its group.
+void CoupledPreconditioner::findLeaders(const CoupledSystem& system) {
+    m_leader.resize(system.bodyCount());
+    std::iota(m_leader.begin(), m_leader.end(), 0);
+    for (const auto& coupling : system.couplings()) {
+        const auto [low, high] = std::minmax(m_leader[coupling.a], m_leader[coupling.b]);
+        std::replace(m_leader.begin(), m_leader.end(), int(high), int(low));
     }
+}
+
+void CoupledPreconditioner::factorGroups(const CoupledSystem& system) {
+    findLeaders(system);
+    m_place.resize(m_leader.size());
+    for (int first = 0; first < system.bodyCount(); ++first) {
+        const auto size = static_cast<std::size_t>(std::count(m_leader.begin(), m_leader.end(), first));
+        if (size > 1) factorGroup(system, first, size);
+    }
+}
+
+/// One that has the memory for so many bodies, if there is one.
+CoupledPreconditioner::BodyGroup& CoupledPreconditioner::takeGroup(std::size_t size) {
+    const std::size_t place = m_groupCount++;
+    std::size_t fitting = place;
+    while (fitting < m_groups.size() && m_groups[fitting].bodies.size() != size) ++fitting;
+    if (fitting == m_groups.size()) m_groups.emplace_back();
+    std::swap(m_groups[place], m_groups[fitting]);
+    return m_groups[place];
+}
+
+void CoupledPreconditioner::factorGroup(const CoupledSystem& system, int first, std::size_t count) {
+    BodyGroup& group = takeGroup(count);
+    group.bodies.clear();
+    for (int b = first; b < system.bodyCount(); ++b) {
+        if (m_leader[b] != first) continue;
+        m_place[b] = 6 * static_cast<int>(group.bodies.size());
+        group.bodies.push_back(b);
+    }
+    const auto size = 6 * static_cast<Eigen::Index>(group.bodies.size());
+    group.matrix.setZero(size, size);
+    group.part.resize(size);
+    for (const int b : group.bodies) group.matrix.block<6, 6>(m_place[b], m_place[b]) = m_bodyBlocks[b];
+    for (const auto& c : system.couplings()) {
+        if (m_leader[c.a] != first) continue;
+        group.matrix.block<6, 6>(m_place[c.a], m_place[c.b]) += c.mass;
+        group.matrix.block<6, 6>(m_place[c.b], m_place[c.a]) += c.mass.transpose();
+    }
+    group.factor.compute(group.matrix);
 }
 
 /// In single precision what is computed with in double: iterations need to know P no better.
@@ -261,8 +273,9 @@ void CoupledPreconditioner::apply(const CoupledSystem& system, const CoupledVect
         }
     }
     system.filter(z);
-    if (m_columns.empty()) return applyToBodies(r.w, z.w);
-    Eigen::VectorXd twists = r.w.reshaped();
+    if (!m_isEliminating) return applyToBodies(r.w, z.w);
+    Eigen::VectorXd& twists = m_twists;
+    twists = r.w.reshaped();
     for (Eigen::Index k = 0; k < twists.size(); ++k) twists[k] -= alongComplete(system, m_columns[k].s, z.s);
     m_schur.solveInPlace(twists);
     for (Eigen::Index k = 0; k < twists.size(); ++k) z.s -= twists[k] * m_solved[k].s;
@@ -281,11 +294,10 @@ void CoupledPreconditioner::apply(const CoupledSystem& system, const CompactVect
 void CoupledPreconditioner::applyToBodies(const Eigen::Matrix<double, 6, Eigen::Dynamic>& r,
                                           Eigen::Matrix<double, 6, Eigen::Dynamic>& z) const {
     for (std::size_t b = 0; b < m_bodies.size(); ++b) z.col(b) = m_bodies[b].solve(r.col(b));
-    for (const BodyGroup& group : m_groups) {
-        Eigen::VectorXd part(6 * group.bodies.size());
-        for (std::size_t k = 0; k < group.bodies.size(); ++k) part.segment<6>(6 * k) = r.col(group.bodies[k]);
-        group.factor.solveInPlace(part);
-        for (std::size_t k = 0; k < group.bodies.size(); ++k) z.col(group.bodies[k]) = part.segment<6>(6 * k);
+    for (const BodyGroup& group : std::span(m_groups).first(m_groupCount)) {
+        for (std::size_t k = 0; k < group.bodies.size(); ++k) group.part.segment<6>(6 * k) = r.col(group.bodies[k]);
+        group.factor.solveInPlace(group.part);
+        for (std::size_t k = 0; k < group.bodies.size(); ++k) z.col(group.bodies[k]) = group.part.segment<6>(6 * k);
     }
 }
 

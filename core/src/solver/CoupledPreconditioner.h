@@ -33,6 +33,14 @@ class CoupledPreconditioner {
     bool isComplete() const;
 
   private:
+    /// Bodies that couplings join, directly or through others.
+    struct BodyGroup {
+        std::vector<int> bodies;
+        Eigen::MatrixXd matrix;
+        Eigen::LDLT<Eigen::MatrixXd> factor;
+        mutable Eigen::VectorXd part;
+    };
+
     void buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind);
     bool factorCompletely(const CoupledSystem& system, std::size_t shell);
     bool isCompact(const CoupledSystem& system, std::size_t shell) const;
@@ -46,13 +54,10 @@ class CoupledPreconditioner {
                        Eigen::Matrix<double, 6, Eigen::Dynamic>& z) const;
     void addRows(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
     void filterBlocks(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
-    void factorGroups(const CoupledSystem& system, const std::vector<Mat6>& blocks);
-
-    /// Bodies that couplings join, directly or through others.
-    struct BodyGroup {
-        std::vector<int> bodies;
-        Eigen::LDLT<Eigen::MatrixXd> factor;
-    };
+    void factorGroups(const CoupledSystem& system);
+    void findLeaders(const CoupledSystem& system);
+    BodyGroup& takeGroup(std::size_t size);
+    void factorGroup(const CoupledSystem& system, int first, std::size_t size);
 
     std::vector<Mat3> m_diagonal, m_lower;             ///< scratch: filtered copy of one shell's matrix
     std::vector<const Mat3*> m_free;                   ///< scratch
@@ -60,11 +65,18 @@ class CoupledPreconditioner {
     mutable std::vector<float> m_rounded, m_roundedZ;  ///< scratch: a shell's r and z, four floats a row
     std::vector<IncompleteCholesky> m_factors;
     std::vector<std::unique_ptr<ShellFactor>> m_complete;  ///< of each shell; null: not factored completely
+    bool m_isEliminating = false;                          ///< shells, from the bodies' equations:
     std::vector<CoupledVector> m_columns, m_solved;        ///< shells' part of the bodies' columns, and A^-1 of it
-    Eigen::LDLT<Eigen::MatrixXd> m_schur;                  ///< of all bodies' twists, where shells are eliminated
+    CoupledVector m_unit;                                  ///< scratch
+    Eigen::MatrixXd m_schurMatrix;                         ///< of all bodies' twists
+    Eigen::LDLT<Eigen::MatrixXd> m_schur;
+    mutable Eigen::VectorXd m_twists;  ///< scratch
     std::vector<std::vector<Mat3>> m_inverseBlocks;
+    std::vector<Mat6> m_bodyBlocks;  ///< masses of the bodies with what touches them
     std::vector<Eigen::LDLT<Mat6>> m_bodies;
-    std::vector<BodyGroup> m_groups;
+    std::vector<int> m_leader, m_place;  ///< of each body: the first of its group, its row in that one's matrix
+    std::vector<BodyGroup> m_groups;     ///< the first m_groupCount of them; the others keep their memory
+    std::size_t m_groupCount = 0;
     Preconditioner m_kind = Preconditioner::BlockJacobi;
 };
 

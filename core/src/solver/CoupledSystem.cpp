@@ -35,14 +35,12 @@ Mat6 pointStiffness(const Mat3& k, const Vec3& arm) {
     return pointStiffness(k, arm, arm);
 }
 
-void CoupledSystem::begin(std::vector<ShellPart> shells, int vertexCount, std::vector<Mat6> mass,
-                          std::vector<Vec6> freeTwist, std::vector<BodyCoupling> couplings, Precision precision,
-                          WorkerTeam* team) {
-    m_shells = std::move(shells);
+void CoupledSystem::begin(const std::vector<ShellPart>& shells, int vertexCount, const std::vector<Mat6>& mass,
+                          const std::vector<Vec6>& freeTwist, const std::vector<BodyCoupling>& couplings,
+                          Precision precision, WorkerTeam* team) {
+    m_shells = shells;
     m_vertexCount = vertexCount;
-    m_mass = std::move(mass);
-    m_freeTwist = std::move(freeTwist);
-    m_couplings = std::move(couplings);
+    setBodies(mass, freeTwist, couplings);
     m_v.resize(3, vertexCount);
     m_q.resize(3, vertexCount);
     m_constraintOf.assign(vertexCount, -1);
@@ -60,10 +58,10 @@ void CoupledSystem::begin(std::vector<ShellPart> shells, int vertexCount, std::v
     }
 }
 
-void CoupledSystem::setContacts(std::vector<VertexConstraint> constraints, std::vector<SoftRow> rows) {
+void CoupledSystem::setContacts(const std::vector<VertexConstraint>& constraints, const std::vector<SoftRow>& rows) {
     for (const auto& c : m_constraints) m_constraintOf[c.vertex] = -1;
-    m_constraints = std::move(constraints);
-    m_rows = std::move(rows);
+    m_constraints = constraints;
+    m_rows = rows;
     for (std::size_t i = 0; i < m_constraints.size(); ++i) {
         assert(m_constraintOf[m_constraints[i].vertex] < 0);
         m_constraintOf[m_constraints[i].vertex] = static_cast<int>(i);

@@ -88,9 +88,9 @@ class CoupledSystem {
 
     /// `couplings`: off-diagonal blocks of the mass, between dynamic bodies by their index here. `team` may help with
     /// whatever is done with this system until the next begin.
-    void begin(std::vector<ShellPart> shells, int vertexCount, std::vector<Mat6> mass, std::vector<Vec6> freeTwist,
-               std::vector<BodyCoupling> couplings = {}, Precision precision = Precision::Double,
-               WorkerTeam* team = nullptr);
+    void begin(const std::vector<ShellPart>& shells, int vertexCount, const std::vector<Mat6>& mass,
+               const std::vector<Vec6>& freeTwist, const std::vector<BodyCoupling>& couplings = {},
+               Precision precision = Precision::Double, WorkerTeam* team = nullptr);
     /// Replaces the bodies' masses and free twists.
     void setBodies(const std::vector<Mat6>& mass, const std::vector<Vec6>& freeTwist,
                    const std::vector<BodyCoupling>& couplings) {
@@ -99,7 +99,7 @@ class CoupledSystem {
         m_couplings = couplings;
     }
     /// Replaces all constraints and rows. At most one constraint per vertex.
-    void setContacts(std::vector<VertexConstraint> constraints, std::vector<SoftRow> rows);
+    void setContacts(const std::vector<VertexConstraint>& constraints, const std::vector<SoftRow>& rows);
 
     std::span<const ShellPart> shells() const { return m_shells; }
     std::span<const VertexConstraint> constraints() const { return m_constraints; }

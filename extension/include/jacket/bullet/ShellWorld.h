@@ -84,9 +84,9 @@ class ShellWorld : public btActionInterface {
     void solveNewcomers(btCollisionWorld& world, double h);
     void moveShells(btCollisionWorld& world, double h);
     void solveIsland(Island& island, double h);
-    void accept(Island& island, const StepReport& report, const std::vector<CoupledBody>& coupled,
+    void accept(Island& island, const StepReport& report, std::span<const CoupledBody> coupled,
                 const Vec3& pendingGravity);
-    void carry(ShellBody& shell, int vertex, const Island& island, int body, const std::vector<CoupledBody>& coupled,
+    void carry(ShellBody& shell, int vertex, const Island& island, int body, std::span<const CoupledBody> coupled,
                const Vec3* anchor);
     void react(btCollisionObject& object, const CoupledBody& coupled);
     void forgetPushes(const btCollisionWorld& world);
