@@ -125,6 +125,8 @@ struct IslandSolver::Impl {
     void solveStep(const IslandInput& input, StepReport& report);
     double linearTolerance(const IslandInput& input) const;
     double floorOfReference(const IslandInput& input, double share) const;
+    PcgReport solveOnce(const IslandInput& input, bool roughly, int maxIterations, StepReport& report);
+    void solveRound(const IslandInput& input, bool roughly, int& freshIterations, StepReport& report);
     void solveRounds(const IslandInput& input, StepReport& report);
     void store(const IslandInput& input, StepReport& report);
     void pushOut(const IslandInput& input, StepReport& report);
@@ -535,49 +537,68 @@ double IslandSolver::Impl::floorOfReference(const IslandInput& input, double sha
     return sum * kick * kick;
 }
 
-/// Until the contacts agree with the motion that they lead to. Where that is asked only once, and they changed in the
-/// last step, a rough solve tells enough.
-void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& report) {
+/// From `guess`, with the present contacts and preconditioner.
+PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, int maxIterations, StepReport& report) {
     constexpr double kCompleteTolerance = 1e-6;  // of what a solve starts with, where it takes a few iterations
     constexpr double kRough = 0.03;              // tolerance of a rough solve
     constexpr double kShare = 0.1;               // which leaves at most this of the residual that it starts with
-    const ShellSettings& settings = input.shells[0]->settings();
     const double tolerance = linearTolerance(input);
-    int maxIterations = settings.maxIterations;
+    system.start(start, freeTwist, u);  // dv = 0
+    const double floor = floorOfReference(input, preconditioner.isCoarse(system) ? 1.0 : 0.1);
+    const double norm2 = std::max(pcg.begin(system, preconditioner, u), floor);  // the tolerance refers to it
+    system.start(guess, guessTwist, u);
+    const double rho = pcg.begin(system, preconditioner, u);
+    double target2 = tolerance * tolerance * norm2;
+    if (preconditioner.isComplete()) target2 = std::min(target2, kCompleteTolerance * kCompleteTolerance * rho);
+    if (roughly) target2 = std::max(target2, std::min(kRough * kRough * norm2, kShare * kShare * rho));
+    const PcgReport solve = pcg.finish(system, preconditioner, target2, 1.0, maxIterations, u);
+    ++report.solves;
+    report.pcgIterations += solve.iterations;
+    report.residual = solve.residual * std::sqrt(target2 / norm2);
+    report.converged = solve.converged;
+    unfiltered = pcg.unfilteredResidual();
+    return solve;
+}
+
+/// With the factor of the last solve, or with a new one where there is none, `freshIterations` < 0, and where contacts
+/// have become others than it knows: then it uses up more than twice the iterations that it took when it was new.
+void IslandSolver::Impl::solveRound(const IslandInput& input, bool roughly, int& freshIterations, StepReport& report) {
+    int maxIterations = 0;
     for (const Shell* shell : input.shells) maxIterations = std::max(maxIterations, shell->settings().maxIterations);
+    const bool isNew = freshIterations < 0 || preconditioner.isComplete() || system.precision() == Precision::Single;
+    if (!isNew) {
+        LapTimer lap(input);
+        preconditioner.updateBodies(system);
+        lap.addTo(times.factor);
+        const int most = std::min(maxIterations, 20 + 2 * freshIterations);
+        const bool isDone = solveOnce(input, roughly, most, report).converged || most == maxIterations;
+        lap.addTo(times.solve);
+        if (isDone) return;
+        system.velocities(u, guess);
+        guessTwist = u.w;
+    }
+    LapTimer lap(input);
+    preconditioner.build(system, input.shells[0]->settings().preconditioner);
+    lap.addTo(times.factor);
+    freshIterations = solveOnce(input, roughly, maxIterations, report).iterations;
+    lap.addTo(times.solve);
+}
+
+/// Until the contacts agree with the motion that they lead to. Where that is asked only once, and they changed in the
+/// last step, a rough solve tells enough.
+void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& report) {
     guess = report.solves == 0 ? expected : v;
     guessTwist = report.solves == 0 ? freeTwist : u.w;
     u.resize(static_cast<int>(start.cols()), system.bodyCount());
-    int freshIterations = -1, lastIterations = 0;  // of the first solve with the present factor, and of the last one
+    int freshIterations = -1;  // of the first solve with the present factor
     bool roughly = response.isQuick() && response.hasContacts() && lastRounds > 1;
     int round = 0;
     for (;;) {
-        LapTimer lap(input);
+        LapTimer writing(input);
         response.writeTo(system);
-        lap.addTo(times.contact);
-        const bool isNew = freshIterations < 0 || preconditioner.isComplete() ||
-                           system.precision() == Precision::Single || lastIterations > 20 + 2 * freshIterations;
-        if (isNew)
-            preconditioner.build(system, settings.preconditioner);
-        else
-            preconditioner.updateBodies(system);
-        lap.addTo(times.factor);
-        system.start(start, freeTwist, u);  // dv = 0
-        const double floor = floorOfReference(input, preconditioner.isCoarse(system) ? 1.0 : 0.1);
-        const double norm2 = std::max(pcg.begin(system, preconditioner, u), floor);  // the tolerance refers to it
-        system.start(guess, guessTwist, u);
-        const double rho = pcg.begin(system, preconditioner, u);
-        double target2 = tolerance * tolerance * norm2;
-        if (preconditioner.isComplete()) target2 = std::min(target2, kCompleteTolerance * kCompleteTolerance * rho);
-        if (roughly) target2 = std::max(target2, std::min(kRough * kRough * norm2, kShare * kShare * rho));
-        const PcgReport solve = pcg.finish(system, preconditioner, target2, 1.0, maxIterations, u);
-        lastIterations = solve.iterations;
-        if (isNew) freshIterations = solve.iterations;
-        ++report.solves;
-        report.pcgIterations += solve.iterations;
-        report.residual = solve.residual * std::sqrt(target2 / norm2);
-        report.converged = solve.converged;
-        unfiltered = pcg.unfilteredResidual();
+        writing.addTo(times.contact);
+        solveRound(input, roughly, freshIterations, report);
+        LapTimer lap(input);
         if (!u.allFinite() || !unfiltered.allFinite()) return;
         system.velocities(u, v);
         lap.addTo(times.solve);
