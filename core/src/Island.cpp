@@ -50,15 +50,17 @@ Vec3 contactArm(const IslandInput& input, const Contact& contact) {
     return arm;
 }
 
-/// Whether a shell is factored completely: incomplete factors know little of bending that spreads over several edges.
-/// Of larger shells, where it costs more, those over many (sheet metal, but no cloth) with bodies near them, whose
-/// contacts ask for more than bending in the air does.
-bool isToBeFactored(const Shell& shell, double h, bool isNearBodies) {
-    constexpr int kSmall = 600, kMost = 4000;  // vertices
-    constexpr double kEdges = 5.0;
+/// Whether a shell is factored completely: incomplete factors know little of bending that spreads over several edges,
+/// and of what stands on its edge. The larger a shell, the more that costs; of large ones only sheet metal, no cloth,
+/// and with bodies near them, whose contacts ask for more than bending in the air does.
+bool isToBeFactored(const Shell& shell, double h, bool isNearBodies, bool givesWay) {
+    constexpr int kTiny = 200, kSmall = 600, kMost = 4000;  // vertices
+    constexpr double kEdgesOfTiny = 1.0, kEdges = 5.0;
     const int n = shell.vertexCount();
     if (n > kMost || shell.settings().preconditioner != Preconditioner::IncompleteCholesky) return false;
-    return n <= kSmall ? shell.isStiff(h) : isNearBodies && shell.bendingLength(h) > kEdges * shell.meanEdge();
+    if (n > kSmall) return isNearBodies && shell.bendingLength(h) > kEdges * shell.meanEdge();
+    if (isNearBodies && !givesWay) return true;
+    return n <= kTiny ? shell.bendingLength(h) > kEdgesOfTiny * shell.meanEdge() : shell.isStiff(h);
 }
 
 using BodyVectors = Eigen::Matrix<double, 6, Eigen::Dynamic>;  ///< twists or momenta
@@ -83,6 +85,7 @@ struct IslandSolver::Impl {
     Points from;                     ///< velocities that the step's momentum starts from (BDF2: not `start`)
     std::vector<double> stepOf;      ///< of each shell, as its integrator counts it [s]
     std::vector<char> factored;      ///< shells: completely
+    bool givesWay = true;            ///< false, as long as anything touches: see pushesStrain
     Points lastChange;               ///< dv of the last step
     Points expected;                 ///< velocities if that goes on: the warm start
     Points unfiltered;               ///< (b - A v) at the solution, soft rows included
@@ -105,6 +108,7 @@ struct IslandSolver::Impl {
 
     void clearReport();
     void gather(const IslandInput& input);
+    void beginContacts(const IslandInput& input);
     void beginTwoStep(const IslandInput& input, std::size_t shell);
     void assemble(const IslandInput& input, bool atEnd);
     bool isAnyFactored() const { return std::count(factored.begin(), factored.end(), 0) < std::ssize(factored); }
@@ -129,6 +133,7 @@ struct IslandSolver::Impl {
     void solveRound(const IslandInput& input, bool roughly, int& freshIterations, StepReport& report);
     void solveRounds(const IslandInput& input, StepReport& report);
     void store(const IslandInput& input, StepReport& report);
+    bool pushesStrain(const IslandInput& input);
     void pushOut(const IslandInput& input, StepReport& report);
     void balance(const IslandInput& input, std::vector<ContactImpulse>& impulses);
     void shift(const IslandInput& input, std::span<const Vec3> onShells, std::vector<ContactImpulse>& impulses);
@@ -152,10 +157,15 @@ const StepReport& IslandSolver::solve(const IslandInput& input) {
     s.times = {};
     s.gather(input);
     LapTimer lap(input);
-    const ContactResponse::Numbering numbering{s.offsets, s.dynamicIndex, s.stepOf, s.isAnyFactored()};
-    s.response.begin(input, numbering, s.expected, s.y);  // contacts at the start, y
+    s.beginContacts(input);
     lap.addTo(s.times.contact);
     s.solveStep(input, report);  // A, b; filtered PCG until the contacts agree
+    if (!report.limited && s.pushesStrain(input)) {
+        s.givesWay = false;
+        s.gather(input);
+        s.beginContacts(input);
+        s.solveStep(input, report);
+    }
     report.times = s.times;
     if (!s.u.allFinite() || !s.unfiltered.allFinite()) {  // state untouched; the caller decides
         report.finite = report.converged = false;
@@ -196,7 +206,7 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
         if (input.bodies.empty()) beginTwoStep(input, k);
     factored.clear();
     for (std::size_t k = 0; k < input.shells.size(); ++k)
-        factored.push_back(isToBeFactored(*input.shells[k], stepOf[k], !input.bodies.empty()));
+        factored.push_back(isToBeFactored(*input.shells[k], stepOf[k], !input.bodies.empty(), givesWay));
     dynamicIndex.assign(input.bodies.size(), -1);
     dynamicBodies.clear();
     for (std::size_t b = 0; b < input.bodies.size(); ++b) {
@@ -208,6 +218,12 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
     supports.begin(input.bodies, input.couplings, input.rigidContacts, dynamicIndex);
     if (lastChange.cols() != count) lastChange.setZero(3, count);
     expected = start + lastChange;
+}
+
+/// Those at the start of the step, and y.
+void IslandSolver::Impl::beginContacts(const IslandInput& input) {
+    response.begin(input, {offsets, dynamicIndex, stepOf, isAnyFactored(), givesWay}, expected, y);
+    givesWay = givesWay || !response.hasContacts();
 }
 
 /// BDF2 with steps h and h' before it, r = h / h', gamma = (1 + r) / (1 + 2 r):
@@ -653,6 +669,37 @@ void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
         shell.m_v = v.middleCols(offsets[k], n);
         shell.m_y = y.middleCols(offsets[k], n);
     }
+}
+
+/// Whether pushOut would strain the shells, which then do not give way to it: sheet metal that stands on its edge, a
+/// bowl on its rim.
+bool IslandSolver::Impl::pushesStrain(const IslandInput& input) {
+    constexpr double kMost = kMostEnergyGain;
+    constexpr double kNeighbourhood = 4;  // stiffness against moving one vertex alone, in E t
+    if (!response.isQuick() || !unfiltered.allFinite()) return false;
+    const auto& pushes = response.pushes(v);
+    const auto energyAfter = [&] {
+        double sum = 0.0;
+        for (std::size_t k = 0; k < input.shells.size(); ++k) sum += elasticEnergyAfter(input, k, v);
+        return sum;
+    };
+    double moving = 0.0, stretching = 0.0;
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        const Shell& shell = *input.shells[k];
+        const auto part = v.middleCols(offsets[k], shell.vertexCount());
+        moving += 0.5 * shell.masses().dot(part.colwise().squaredNorm().transpose());
+        moving += 0.5 * shell.masses().sum() * (stepOf[k] * input.gravity).squaredNorm();
+        const auto end = pushes.lower_bound(offsets[k] + shell.vertexCount());
+        for (auto one = pushes.lower_bound(offsets[k]); one != end; ++one)
+            stretching += 0.5 * kNeighbourhood * shell.material().stretchStiffness() * one->second.squaredNorm();
+    }
+    if (stretching <= kMost * moving) return false;
+    reached = v;
+    const double before = energyAfter();
+    for (const auto& [vertex, by] : pushes) v.col(vertex) += by / input.h;
+    const double after = energyAfter();
+    v.swap(reached);
+    return after - before > kMost * (moving + before);
 }
 
 /// The contacts' last word where they were settled in few rounds.

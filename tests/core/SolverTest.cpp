@@ -579,8 +579,8 @@ TEST(FilteredPcgTest, CompleteFactorsNeedOneIteration) {
         Island island(14, {13, 8}, 3);
         island.couple({{0, 2}});
         std::vector<CoupledSystem::ShellPart> parts(island.system.shells().begin(), island.system.shells().end());
-        parts[0].isStiff = true;
-        parts[1].isStiff = all;
+        parts[0].isFactored = true;
+        parts[1].isFactored = all;
         island.system.begin(parts, 21, island.system.mass(), island.system.freeTwist(),
                             {island.system.couplings().begin(), island.system.couplings().end()});
         makeBusy(island, 3.0);

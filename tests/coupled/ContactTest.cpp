@@ -261,6 +261,29 @@ TEST(Contact, AClothOfFineMeshGainsNoEnergyFromABox) {
     }
 }
 
+/// Stands on its rim, in whose plane it hardly gives way: what moves a vertex alone out of the floor strains it.
+class BowlOnFloor : public ::testing::TestWithParam<std::tuple<bool, double>> {};
+
+TEST_P(BowlOnFloor, GainsNoEnergyAndIsNotDented) {
+    const auto [isPlastic, h] = GetParam();
+    constexpr double kGap = 0.003;
+    Scene scene;
+    scene.addFloor();
+    TriangleMesh mesh = makeHemisphere(0.3, 5);
+    mesh.positions.row(1).array() += kGap;
+    ShellMaterial material{.young = 7e10, .poisson = 0.33, .thickness = 4e-4, .density = 2700.0, .yieldStress = 2e7};
+    auto& bowl = scene.shells->add(mesh, material, {.plasticity = isPlastic});
+    const double start = bowl.shell().masses().sum() * 9.81 * kGap;
+    for (double t = 0.0; t < 0.5; t += h) {
+        scene.step(h);
+        const ShellEnergy energy = bowl.shell().energy();
+        ASSERT_LT(energy.kinetic + energy.membrane + energy.bending + energy.plasticWork, 1.3 * start)
+            << "at " << t << " s";
+    }
+    EXPECT_GT(bowl.shell().positions().row(1).minCoeff(), -1e-3);
+}
+INSTANTIATE_TEST_SUITE_P(Grid, BowlOnFloor, ::testing::Combine(::testing::Bool(), ::testing::Values(kStep, kStep / 8)));
+
 /// Moves a kinematic ball, by hand or by a motion state.
 class KinematicBall : public ::testing::TestWithParam<bool> {
   protected:

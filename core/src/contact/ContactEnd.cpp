@@ -253,15 +253,21 @@ double ContactResponse::endGap(const Touch& touch, const IslandVelocities& solve
 /// What few rounds have left inside a body is pushed out of it along the normal. A sheet gives way to that nearly for
 /// nothing; a stiff one feels it in the next step. In a valley one wall pushes a vertex into the other, so that all
 /// have their turn several times.
-void ContactResponse::pushOut(Points& v, std::vector<ContactImpulse>& impulses) {
-    if (!m_input.contacts || !isQuick()) return;
-    findPushes(v);
+const std::pmr::map<int, Vec3>& ContactResponse::pushes(const Points& v) {
     m_pushed.clear();
+    if (!m_input.contacts || !isQuick()) return m_pushed;
+    findPushes(v);
     for (int turn = 0; turn < kMostTurns; ++turn) {
         bool isInside = false;
         for (Push& one : m_pushes) isInside |= push(one);
         if (!isInside) break;
     }
+    return m_pushed;
+}
+
+void ContactResponse::pushOut(Points& v, std::vector<ContactImpulse>& impulses) {
+    if (!m_input.contacts || !isQuick()) return;
+    pushes(v);
     m_deepestGap = 0.0;
     for (const Push& one : m_pushes) {
         const Contact& contact = *one.contact;

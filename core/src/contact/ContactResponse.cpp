@@ -93,7 +93,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     for (const auto& anchor : input.anchors) m_held[m_offsets[anchor.shell] + anchor.vertex] = 1;
     if (!input.contacts) return;
 
-    m_care = isAmongWalls() && !isAnyStiff() ? kAmongWalls : kInFull;
+    m_care = isAmongWalls() && !isAnyStiff() && numbering.givesWay ? kAmongWalls : kInFull;
     if (numbering.isAnyFactored) m_care = kStiff;
     m_creep = creepSpeed();
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);

@@ -32,6 +32,7 @@ class ContactResponse {
         const std::vector<int>& dynamicIndex;  ///< of each body; -1: prescribed
         const std::vector<double>& stepOf;     ///< length of the step as each shell's integrator counts it [s]
         bool isAnyFactored;                    ///< some shell: completely
+        bool givesWay;                         ///< false: pushOut would strain some shell
     };
     /// Contacts at the start of the step, and the position alteration y of vertices that stand inside a body.
     /// `expected`: velocities at the end of the step as they would be if the last step's change went on; kept by
@@ -47,6 +48,8 @@ class ContactResponse {
     /// Whether nothing rests on the contacts and the shells give way: they are then looked at once, after a rough
     /// solve, again only where a vertex ends deep inside a body, and pushOut does what is left.
     bool isQuick() const { return m_care.rounds < kInFull.rounds; }
+    /// By what pushOut would move vertices, of which some stay where they are [m].
+    const std::pmr::map<int, Vec3>& pushes(const Points& v);
     /// Whether a round is the last one that may be.
     bool isLast(int round) const { return round + 1 >= m_care.rounds; }
     /// Whether anything is near.

@@ -41,7 +41,7 @@ void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t 
 
 bool CoupledPreconditioner::factorCompletely(const CoupledSystem& system, std::size_t shell) {
     const auto& part = system.shells()[shell];
-    if (!part.isStiff || m_lower.empty()) {
+    if (!part.isFactored || m_lower.empty()) {
         m_complete[shell].reset();
         return false;
     }

@@ -82,7 +82,7 @@ class CoupledSystem {
         const Points* rhs;
         int offset;                         ///< first vertex in the island's numbering
         const Points* positions = nullptr;  ///< for a coarse space; null: without
-        bool isStiff = false;               ///< for its mesh: to be factored completely
+        bool isFactored = false;            ///< completely
         bool isCompact = false;             ///< preconditioned in single precision, with a coarse space, in any case
     };
 
