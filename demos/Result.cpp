@@ -99,6 +99,8 @@ Json Result::json(const World& end) const {
     result["momentum_error"] = isFree(scene) ? numberOrNull(momentumError()) : Json(nullptr);
     result["converged"] = m_converged;
     result["finite"] = m_finite;
+    result["unconverged_steps"] = end.unconvergedSteps();
+    result["unsettled_steps"] = end.unsettledSteps();
     result["rejected_steps"] = end.rejectedSteps();
     result["passed_steps"] = end.passedSteps();
     result["state"] = stateHash(end);
@@ -159,6 +161,14 @@ void printSpeed(std::ostream& out, const Json& result) {
               "mean " + brief(result["pcg_iterations"]["mean"]) + ", most " + brief(result["pcg_iterations"]["max"]));
 }
 
+std::string whyNotConverged(const Json& result) {
+    const Json& steps = result["unconverged_steps"];
+    if (steps == 0) return "no equilibrium was found";  // mode static
+    const double all = number(result["frames"]) * number(result["substeps"]);
+    return "in " + brief(steps) + " of " + brief(Json(all)) +
+           " steps a solve used up its iterations, or a contact ended deeper than allowed";
+}
+
 }  // namespace
 
 void printSummary(std::ostream& out, const Json& result) {
@@ -189,7 +199,7 @@ void printSummary(std::ostream& out, const Json& result) {
         printLine(out, body["name"],
                   "at " + brief(body["position"]) + " m, velocity " + brief(body["velocity"]) + " m/s");
     for (const auto& [name, value] : result["probes"].items()) printLine(out, name, brief(value));
-    if (!result["converged"].get<bool>()) out << "  NOT CONVERGED: a step used up its iterations\n";
+    if (!result["converged"].get<bool>()) out << "  NOT CONVERGED: " << whyNotConverged(result) << '\n';
     if (!result["finite"].get<bool>()) out << "  NOT FINITE: a step was rejected or gave numbers that are none\n";
 }
 

@@ -215,6 +215,12 @@ int World::contactCount(int shell) const {
 int World::rejectedSteps() const {
     return m_impl->shells.lastStep().rejectedSteps;
 }
+int World::unconvergedSteps() const {
+    return m_impl->shells.lastStep().unconvergedSteps;
+}
+int World::unsettledSteps() const {
+    return m_impl->shells.lastStep().unsettledSteps;
+}
 int World::passedSteps() const {
     return m_impl->shells.lastStep().passedSteps;
 }

@@ -61,9 +61,11 @@ class World {
     Points contactForces(int shell) const;
     const Points& initialPositions(int shell) const;
     std::vector<BodyState> bodies() const;
-    Vec3 linearMomentum() const;  ///< of shells and dynamic bodies, at one moment [N s]
-    int rejectedSteps() const;    ///< since the start
-    int passedSteps() const;      ///< since the start: those in which a fast body went through a shell or may have
+    Vec3 linearMomentum() const;   ///< of shells and dynamic bodies, at one moment [N s]
+    int rejectedSteps() const;     ///< since the start
+    int unconvergedSteps() const;  ///< since the start: a solve used up its iterations, or a contact ended too deep
+    int unsettledSteps() const;    ///< since the start: contacts used up their rounds
+    int passedSteps() const;       ///< since the start: those in which a fast body went through a shell or may have
     bool isAsleep(int shell) const;
 
     std::vector<std::string> takeWarnings();

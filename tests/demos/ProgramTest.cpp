@@ -39,7 +39,8 @@ TEST(Program, WritesEveryFileAndEveryKeyOfTheResult) {
          {"version",        "scene",           "seed",   "precision",      "threads",        "dt",
           "frames",         "simulated_s",     "wall_s", "ms_per_step",    "pcg_iterations", "max_stretch",
           "peak_stretch",   "max_penetration", "energy", "momentum_error", "converged",      "finite",
-          "rejected_steps", "passed_steps",    "shells", "bodies",         "probes"})
+          "rejected_steps", "passed_steps",    "shells", "bodies",         "probes",         "unconverged_steps",
+          "unsettled_steps"})
         EXPECT_TRUE(result.contains(key)) << key;
     for (const char* key : {"kinetic", "membrane", "bending", "plastic_work", "start", "end"})
         EXPECT_TRUE(result["energy"].contains(key)) << key;
@@ -83,6 +84,19 @@ TEST(BundledScenes, RunToTheirEnds) {
         const Json result = parseJson(readText(folder / "out" / "result.json"), "result.json");
         EXPECT_LT(result.at("peak_stretch").get<double>(), 0.5) << scene;
     }
+}
+
+TEST(Program, SaysHowManyStepsDidNotConverge) {
+    const TemporaryFolder folder;
+    const std::string scene = folder.write("fall.json", kFallingSheet);
+    const Outcome run = jacket({"run", scene, "--out", folder / "out", "--set", "shells.0.max_iterations=1", "--set",
+                                R"(shells.0.pin=[{"vertices":[0]}])"});
+    EXPECT_EQ(run.exitCode, 3);
+    const Json result = parseJson(readText(folder / "out" / "result.json"), "result.json");
+    EXPECT_EQ(result["converged"], false);
+    const int steps = result["unconverged_steps"].get<int>();
+    EXPECT_GT(steps, 0);
+    EXPECT_NE(run.out.find("NOT CONVERGED: in " + std::to_string(steps) + " of 6 steps"), std::string::npos) << run.out;
 }
 
 TEST(Program, SettlesAStaticScene) {
