@@ -375,11 +375,19 @@ void IslandSolver::Impl::blend(const IslandInput& input, const Points& other) {
                 v.col(offsets[k] + i) = 0.5 * (v.col(offsets[k] + i) + other.col(offsets[k] + i));
 }
 
-/// As if nothing had been solved: what was is so far off that no share of it can be used.
+/// As if nothing had been solved: what was is so far off that no share of it can be used. What can yield is moved out
+/// of bodies as a whole: it would keep the strain.
 void IslandSolver::Impl::coast(const IslandInput& input, const Points& coasting) {
-    for (std::size_t k = 0; k < input.shells.size(); ++k)
-        for (int i = 0; i < input.shells[k]->vertexCount(); ++i)
-            if (!input.shells[k]->isPinned(i)) v.col(offsets[k] + i) = coasting.col(offsets[k] + i);
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        const Shell& shell = *input.shells[k];
+        for (int i = 0; i < shell.vertexCount(); ++i)
+            if (!shell.isPinned(i)) v.col(offsets[k] + i) = coasting.col(offsets[k] + i);
+        if (input.bodies.empty() || !shell.settings().plasticity || shell.pinCount() > 0) continue;
+        auto alteration = y.middleCols(offsets[k], shell.vertexCount());
+        Eigen::Index most = 0;
+        alteration.colwise().squaredNorm().maxCoeff(&most);
+        alteration.colwise() = Vec3(alteration.col(most));
+    }
     impulseShare = 0.0;
 }
 
