@@ -55,12 +55,12 @@ Vec3 contactArm(const IslandInput& input, const Contact& contact) {
 /// and with bodies near them, whose contacts ask for more than bending in the air does.
 bool isToBeFactored(const Shell& shell, double h, bool isNearBodies, bool givesWay) {
     constexpr int kTiny = 200, kSmall = 600, kMost = 4000;  // vertices
-    constexpr double kEdgesOfTiny = 1.0, kEdges = 5.0;
+    constexpr double kEdges = 5.0;
     const int n = shell.vertexCount();
     if (n > kMost || shell.settings().preconditioner != Preconditioner::IncompleteCholesky) return false;
     if (n > kSmall) return isNearBodies && shell.bendingLength(h) > kEdges * shell.meanEdge();
     if (isNearBodies && !givesWay) return true;
-    return n <= kTiny ? shell.bendingLength(h) > kEdgesOfTiny * shell.meanEdge() : shell.isStiff(h);
+    return n <= kTiny ? shell.isStiffAsAWhole(h) : shell.isStiff(h);
 }
 
 using BodyVectors = Eigen::Matrix<double, 6, Eigen::Dynamic>;  ///< twists or momenta

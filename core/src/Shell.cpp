@@ -121,6 +121,15 @@ bool Shell::isStiff(double h) const {
     return bendingLength(h) > kEdges * m_meanEdge;
 }
 
+bool Shell::isStiffAsAWhole(double h) const {
+    constexpr double kLengths = 16.0;
+    return side() < kLengths * bendingLength(h);
+}
+
+double Shell::side() const {
+    return m_meanEdge * std::sqrt(0.5 * m_mesh->triangleCount());
+}
+
 void Shell::displace(int vertex, const Vec3& by) {
     m_x.col(vertex) += by;
     m_lastH = 0.0;

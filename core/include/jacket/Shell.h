@@ -98,6 +98,8 @@ class Shell {
     double meanEdge() const { return m_meanEdge; }    ///< of the lengths of the edges at rest [m]
     double bendingLength(double h) const;             ///< over which bending spreads in a step: (h^2 D/rho t)^1/4 [m]
     bool isStiff(double h) const;                     ///< whether that is several edges: vertices move together
+    bool isStiffAsAWhole(double h) const;             ///< whether all of it feels a corner within a few steps
+    double side() const;                              ///< of a square with as many triangles of such edges [m]
     const Eigen::VectorXd& masses() const { return m_mass; }  ///< lumped, [kg]
 
     /// Place and motion; sizes must match (throws std::invalid_argument), values must be finite.

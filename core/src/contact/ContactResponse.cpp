@@ -122,25 +122,16 @@ bool ContactResponse::isAmongWalls() const {
                        [](const CoupledBody& b) { return b.prescribed && b.freeTwist.isZero(0.0); });
 }
 
-/// Side of a square with as many triangles of such edges as a shell has [m].
-double ContactResponse::side(std::size_t shell) const {
-    return m_edge[shell] * std::sqrt(0.5 * m_input.shells[shell]->mesh().triangleCount());
-}
-
-/// Whether a shell passes on what one of its corners feels to all of it within a few steps: it does not give way to
-/// being pushed out, but is thrown by it.
+/// A shell that is stiff as a whole does not give way to being pushed out, but is thrown by it.
 bool ContactResponse::isAnyStiff() const {
-    constexpr double kLengths = 16.0;
-    for (std::size_t k = 0; k < m_edge.size(); ++k) {
-        if (side(k) < kLengths * m_input.shells[k]->bendingLength(m_input.h)) return true;
-    }
-    return false;
+    return std::any_of(m_input.shells.begin(), m_input.shells.end(),
+                       [&](const Shell* shell) { return shell->isStiffAsAWhole(m_input.h); });
 }
 
 /// A fifth of what a shell may creep that is held by friction, 1e-4 sqrt(g L), L: the side of a square of its size.
 double ContactResponse::creepSpeed() const {
     double least = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k < m_edge.size(); ++k) least = std::min(least, side(k));
+    for (const Shell* shell : m_input.shells) least = std::min(least, shell->side());
     return 2e-5 * std::sqrt(std::max(m_input.gravity.norm(), 1e-3) * least);
 }
 

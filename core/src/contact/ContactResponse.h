@@ -195,7 +195,6 @@ class ContactResponse {
     bool creeps(const Touch& touch) const { return isQuick() && touch.slip.known && touch.slide.norm() <= m_creep; }
     double slowest() const { return 1e-3 * m_input.h * std::max(m_input.gravity.norm(), 1e-3); }
     bool isAmongWalls() const;
-    double side(std::size_t shell) const;
     bool isAnyStiff() const;
     double creepSpeed() const;
     void findAtEnd(const IslandVelocities& solved, const Points& y);
