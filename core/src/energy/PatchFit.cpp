@@ -149,68 +149,93 @@ std::vector<Frame> vertexFrames(const MirroredMesh& mesh, const std::vector<Patc
 class Balance {
   public:
     Balance(const MirroredMesh& mesh, const Points& rest, const std::vector<char>& balanced,
-            std::vector<Patch>& patches)
-        : m_mesh(mesh), m_patches(patches), m_balanced(balanced) {
-        const std::vector<Frame> frames = vertexFrames(mesh, patches, static_cast<int>(rest.cols()));
-        for (const auto& patch : patches) {
-            const Uv uv = inPlane(mesh, rest, patch) / std::sqrt(patch.area);
-            Part part{.monomials = monomialsAt(uv), .weights = nearness(0.75 * uv), .inverse = {}, .frames = {}};
-            part.inverse = (part.monomials * part.weights.asDiagonal() * part.monomials.transpose())
-                               .completeOrthogonalDecomposition()
-                               .pseudoInverse();
-            for (const int i : patch.nodes) {
-                const auto [vertex, image] = mesh.node(i);
-                const Mat3& mirror = mesh.restImage(image).linear;  // its own inverse, or a turn by 180 degrees
-                const Frame own = frames[vertex];
-                const Frame seen{mirror * own.u, mirror * own.v,
-                                 (mirror * own.normal).dot(patch.normal) < 0.0 ? Vec3(-(mirror * own.normal))
-                                                                               : Vec3(mirror * own.normal)};
-                part.frames.push_back(changeOfFrame(transport({patch.axisU, patch.axisV, patch.normal}, seen)));
-            }
-            m_parts.push_back(std::move(part));
-        }
-    }
+            const std::vector<Patch>& patches)
+        : m_mesh(mesh),
+          m_rest(rest),
+          m_patches(patches),
+          m_balanced(balanced),
+          m_frames(vertexFrames(mesh, patches, static_cast<int>(rest.cols()))) {}
 
     /// Per vertex the sum of area times weight over all patches: what a balanced vertex must not have.
     Points unbalance() const {
         Points sum = Points::Zero(3, m_balanced.size());
-        for (std::size_t t = 0; t < m_parts.size(); ++t) scatter(t, m_patches[t].derivatives, sum);
+        for (const Patch& patch : m_patches)
+            for (std::size_t k = 0; k < patch.nodes.size(); ++k)
+                add(patch, k, changeOfFrame(turnOf(patch, k)), patch.derivatives.col(k), sum);
         return sum;
+    }
+    /// Needed by what follows only: of regular meshes nothing is kept.
+    void prepare() {
+        std::size_t nodes = 0;
+        for (const Patch& patch : m_patches) nodes += patch.nodes.size();
+        m_places.resize(2, nodes);
+        m_weights.resize(nodes);
+        m_turns.reserve(nodes);
+        m_inverses.reserve(m_patches.size());
+        m_first.reserve(m_patches.size());
+        for (const Patch& patch : m_patches) {
+            const std::size_t first = m_turns.size(), count = patch.nodes.size();
+            m_first.push_back(first);
+            m_places.middleCols(first, count) = inPlane(m_mesh, m_rest, patch) / std::sqrt(patch.area);
+            m_weights.segment(first, count) = nearness(0.75 * m_places.middleCols(first, count));
+            const Monomials monomials = monomialsAt(m_places.middleCols(first, count));
+            m_inverses.push_back((monomials * m_weights.segment(first, count).asDiagonal() * monomials.transpose())
+                                     .completeOrthogonalDecomposition()
+                                     .pseudoInverse());
+            for (std::size_t k = 0; k < count; ++k) m_turns.push_back(turnOf(patch, k));
+        }
     }
     /// What the change for `multipliers` adds to unbalance().
     Points apply(const Points& multipliers) const {
         Points sum = Points::Zero(3, m_balanced.size());
-        for (std::size_t t = 0; t < m_parts.size(); ++t) scatter(t, change(t, multipliers), sum);
+        for (std::size_t t = 0; t < m_patches.size(); ++t) {
+            const SecondDerivatives rows = change(t, multipliers);
+            for (std::size_t k = 0; k < m_patches[t].nodes.size(); ++k)
+                add(m_patches[t], k, changeOfFrame(m_turns[m_first[t] + k]), rows.col(k), sum);
+        }
         return sum;
     }
     SecondDerivatives change(std::size_t t, const Points& multipliers) const {
-        const Part& part = m_parts[t];
-        SecondDerivatives wanted(3, part.frames.size());
-        for (std::size_t k = 0; k < part.frames.size(); ++k)
-            wanted.col(k) = m_patches[t].area * (part.frames[k].transpose() * multipliers.col(vertexOf(t, k)));
-        wanted = wanted * part.weights.asDiagonal();
-        const Eigen::Matrix<double, 3, 6> moments = wanted * part.monomials.transpose();
-        return wanted - moments * part.inverse * part.monomials * part.weights.asDiagonal();
+        const Patch& patch = m_patches[t];
+        const std::size_t first = m_first[t], count = patch.nodes.size();
+        const auto weights = m_weights.segment(first, count).asDiagonal();
+        const Monomials monomials = monomialsAt(m_places.middleCols(first, count));
+        SecondDerivatives wanted(3, count);
+        for (std::size_t k = 0; k < count; ++k)
+            wanted.col(k) =
+                patch.area * (changeOfFrame(m_turns[first + k]).transpose() * multipliers.col(vertexOf(patch, k)));
+        wanted = wanted * weights;
+        const Eigen::Matrix<double, 3, 6> moments = wanted * monomials.transpose();
+        return wanted - moments * m_inverses[t] * monomials * weights;
     }
 
   private:
-    struct Part {
-        Monomials monomials;
-        Eigen::VectorXd weights;
-        Eigen::Matrix<double, 6, 6> inverse;
-        std::vector<Mat3> frames;  ///< per node, triangle's to vertex's
-    };
-    int vertexOf(std::size_t t, std::size_t k) const { return m_mesh.node(m_patches[t].nodes[k]).vertex; }
-    void scatter(std::size_t t, const SecondDerivatives& rows, Points& sum) const {
-        for (std::size_t k = 0; k < m_parts[t].frames.size(); ++k) {
-            const int v = vertexOf(t, k);
-            if (m_balanced[v]) sum.col(v) += m_patches[t].area * (m_parts[t].frames[k] * rows.col(k));
-        }
+    int vertexOf(const Patch& patch, std::size_t k) const { return m_mesh.node(patch.nodes[k]).vertex; }
+    /// From the triangle's axes to those of its k-th node.
+    Mat2 turnOf(const Patch& patch, std::size_t k) const {
+        const auto [vertex, image] = m_mesh.node(patch.nodes[k]);
+        const Mat3& mirror = m_mesh.restImage(image).linear;  // its own inverse, or a turn by 180 degrees
+        const Frame& own = m_frames[vertex];
+        const Vec3 normal = mirror * own.normal;
+        const Frame seen{mirror * own.u, mirror * own.v, normal.dot(patch.normal) < 0.0 ? Vec3(-normal) : normal};
+        return transport({patch.axisU, patch.axisV, patch.normal}, seen);
     }
+    void add(const Patch& patch, std::size_t k, const Mat3& toVertex, const Vec3& row, Points& sum) const {
+        const int v = vertexOf(patch, k);
+        if (m_balanced[v]) sum.col(v) += patch.area * (toVertex * row);
+    }
+
     const MirroredMesh& m_mesh;
+    const Points& m_rest;
     const std::vector<Patch>& m_patches;
     const std::vector<char>& m_balanced;
-    std::vector<Part> m_parts;
+    std::vector<Frame> m_frames;  ///< of the vertices
+    // By patch, or by their nodes one behind the other:
+    std::vector<std::size_t> m_first;
+    std::vector<Eigen::Matrix<double, 6, 6>> m_inverses;  ///< of the moments of the weights
+    Uv m_places;                                          ///< in the triangle's plane, in roots of its area
+    Eigen::VectorXd m_weights;
+    std::vector<Mat2> m_turns;
 };
 
 /// Vertices that no patch at a free edge reaches.
@@ -235,13 +260,14 @@ void balancePatches(const MirroredMesh& mesh, const Points& rest, const std::vec
                     std::vector<Patch>& patches) {
     constexpr int kMostIterations = 60;
     constexpr double kLeft = 0.1, kNegligible = 1e-6;  // of the unbalance; of a patch's own weight
-    const Balance balance(mesh, rest, inner, patches);
+    Balance balance(mesh, rest, inner, patches);
     Points multipliers = Points::Zero(3, rest.cols());
     Points residual = -balance.unbalance(), direction = residual;
     const double first = residual.squaredNorm();
     double now = first, gross = 0.0;
     for (const auto& patch : patches) gross += patch.area * patch.area * patch.derivatives.squaredNorm();
     if (!(first > kNegligible * gross)) return;  // a regular mesh
+    balance.prepare();
     for (int i = 0; i < kMostIterations && now > kLeft * kLeft * first; ++i) {
         const Points product = balance.apply(direction);
         const double along = now / direction.cwiseProduct(product).sum();
