@@ -18,18 +18,36 @@ struct Factoring {
     double shift;
 };
 
+/// By columns in the first three places; the last of each is anything. Loads and stores of four numbers stay within the
+/// nine: pieces of two and one would wait for each other in memory.
 JACKET_INLINE void loadBlock(const double* from, Double4 (&to)[3]) {
-    for (int column = 0; column < 3; ++column)
-        to[column] = Double4{from[3 * column], from[3 * column + 1], from[3 * column + 2], 0.0};
+    std::memcpy(&to[0], from, sizeof(to[0]));
+    std::memcpy(&to[1], from + 3, sizeof(to[1]));
+    std::memcpy(&to[2], from + 5, sizeof(to[2]));
+    to[2] = __builtin_shufflevector(to[2], to[2], 1, 2, 3, 3);
 }
 
-JACKET_INLINE void loadTransposed(const double* from, Double4 (&to)[3]) {
-    for (int column = 0; column < 3; ++column)
-        to[column] = Double4{from[column], from[column + 3], from[column + 6], 0.0};
+JACKET_INLINE void transpose(Double4 (&a)[3]) {
+    const Double4 even = __builtin_shufflevector(a[0], a[1], 0, 4, 2, 6);
+    const Double4 odd = __builtin_shufflevector(a[0], a[1], 1, 5, 3, 7);
+    a[0] = __builtin_shufflevector(even, a[2], 0, 1, 4, 4);
+    a[1] = __builtin_shufflevector(odd, a[2], 0, 1, 5, 5);
+    a[2] = __builtin_shufflevector(even, a[2], 2, 3, 6, 6);
 }
 
 JACKET_INLINE void storeBlock(const Double4 (&from)[3], double* to) {
-    for (int column = 0; column < 3; ++column) std::memcpy(to + 3 * column, &from[column], 3 * sizeof(double));
+    const Double4 last = __builtin_shufflevector(from[1], from[2], 2, 4, 5, 6);
+    std::memcpy(to, &from[0], sizeof(last));
+    std::memcpy(to + 3, &from[1], sizeof(last));
+    std::memcpy(to + 5, &last, sizeof(last));
+}
+
+/// The same in single precision.
+JACKET_INLINE void storeRounded(const Double4 (&from)[3], float* to) {
+    const Double4 last = __builtin_shufflevector(from[1], from[2], 2, 4, 5, 6);
+    store4(to, __builtin_convertvector(from[0], Float4));
+    store4(to + 3, __builtin_convertvector(from[1], Float4));
+    store4(to + 5, __builtin_convertvector(last, Float4));
 }
 
 /// c -= a b^T of blocks.
@@ -78,10 +96,9 @@ JACKET_KERNEL bool factorKernel(const Factoring& factoring, int begin, int end) 
         for (Double4& column : d) column *= 1.0 + f.shift;
         for (int k = f.rowStart[i]; k < f.rowStart[i + 1]; ++k) {
             Double4 block[3] = {}, left[3] = {};
-            if (f.source[k] >= 0)
-                loadBlock(f.values + 9 * static_cast<std::size_t>(f.source[k]), block);
-            else
-                loadTransposed(f.values + 9 * static_cast<std::size_t>(~f.source[k]), block);
+            const bool isLower = f.source[k] >= 0;
+            loadBlock(f.values + 9 * static_cast<std::size_t>(isLower ? f.source[k] : ~f.source[k]), block);
+            if (!isLower) transpose(block);
             for (int pair = f.pairStart[k]; pair < f.pairStart[k + 1]; ++pair) {
                 loadBlock(f.left + 9 * f.pairs[2 * pair], left);
                 subtractTransposedProduct(left, f.scaled + 9 * f.pairs[2 * pair + 1], block);
@@ -93,10 +110,9 @@ JACKET_KERNEL bool factorKernel(const Factoring& factoring, int begin, int end) 
                                block[2] * inverse[3 * column + 2];
             storeBlock(left, f.left + 9 * k);
             subtractTransposedProduct(left, f.scaled + 9 * k, d);
-            float *lower = f.lower + 9 * k, *upper = f.upper + 9 * f.upperOf[k];
-            for (int column = 0; column < 3; ++column)
-                for (int row = 0; row < 3; ++row)
-                    lower[3 * column + row] = upper[3 * row + column] = static_cast<float>(left[column][row]);
+            storeRounded(left, f.lower + 9 * k);
+            transpose(left);
+            storeRounded(left, f.upper + 9 * f.upperOf[k]);
         }
         const Triangular t = triangular(d);
         if (!(t.d0 > kLeast * before.d0 && t.d1 > kLeast * before.d1 && t.d2 > kLeast * before.d2)) return false;
