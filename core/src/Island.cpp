@@ -100,6 +100,7 @@ struct IslandSolver::Impl {
     bool unsettled = false;                      ///< contacts of this step have used up their rounds
     int lastRounds = 1;                          ///< changes of the contacts in the last step, and one
     mutable Points at;                           ///< where velocities lead one shell
+    Points rigid;                                ///< velocities of shells that do not deform
     mutable std::vector<double> elasticAtStart;  ///< of each shell at the start of the step; NaN: not yet asked for [J]
     StepTimes times;                             ///< of the step so far
     StepReport lastReport;
@@ -122,7 +123,7 @@ struct IslandSolver::Impl {
     void coast(const IslandInput& input, const Points& coasting);
     double shareWithin(const CoupledBody& body, int dynamic, double speed) const;
     void limitBodies(const IslandInput& input, StepReport& report);
-    Points rigidMotion(const IslandInput& input, const Points& velocities) const;
+    void makeRigid(const IslandInput& input, Points& velocities) const;
     const BodyVectors& endTwists() const;
     bool improves(const IslandInput& input);
     double incrementalPotential(const IslandInput& input, const Points& velocities) const;
@@ -196,6 +197,7 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
         count += shell->vertexCount();
     }
     start.resize(3, count);
+    rigid.resize(3, count);
     for (std::size_t k = 0; k < input.shells.size(); ++k)
         start.middleCols(offsets[k], input.shells[k]->vertexCount()) = input.shells[k]->velocities();
     y.setZero(3, count);
@@ -348,22 +350,21 @@ bool IslandSolver::Impl::overstretches(const IslandInput& input, bool isAgain) c
 void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& report) {
     constexpr int kMostHalvings = 40;
     report.limited = true;
-    const Points rigid = rigidMotion(input, v);
+    rigid = v;
+    makeRigid(input, rigid);
     const bool isHeld =
         std::any_of(input.shells.begin(), input.shells.end(), [](const Shell* shell) { return shell->pinCount() > 0; });
     for (int halving = 0; halving < kMostHalvings && energyGain(input) > kEnergyGain; ++halving) {
         blend(input, rigid);
         if (isHeld) impulseShare *= 0.5;  // its pins take the momentum; a light body would keep the shell's old speed
     }
-    Points coasting = start;
-    for (std::size_t k = 0; k < input.shells.size(); ++k)
-        coasting.middleCols(offsets[k], input.shells[k]->vertexCount()).colwise() += (input.h * input.gravity).eval();
-    coasting = rigidMotion(input, coasting);
+    rigid = start.colwise() + input.h * input.gravity;
+    makeRigid(input, rigid);  // coasting
     for (int halving = 0; halving < kMostHalvings && energyGain(input) > kEnergyGain; ++halving) {
-        blend(input, coasting);
+        blend(input, rigid);
         impulseShare *= 0.5;
     }
-    if (!(energyGain(input) <= kEnergyGain)) coast(input, coasting);
+    if (!(energyGain(input) <= kEnergyGain)) coast(input, rigid);
     for (std::size_t b = 0; impulseShare < 1.0 && b < input.bodies.size(); ++b) response.forget(static_cast<int>(b));
 }
 
@@ -391,14 +392,16 @@ void IslandSolver::Impl::coast(const IslandInput& input, const Points& coasting)
     impulseShare = 0.0;
 }
 
-/// The rigid motion of each shell with the momentum of these velocities; none of shells that are held.
-Points IslandSolver::Impl::rigidMotion(const IslandInput& input, const Points& velocities) const {
-    Points rigid = Points::Zero(3, velocities.cols());
+/// Leaves of velocities the rigid motion of each shell with their momentum; none of shells that are held.
+void IslandSolver::Impl::makeRigid(const IslandInput& input, Points& velocities) const {
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
-        if (shell.pinCount() > 0) continue;
+        auto part = velocities.middleCols(offsets[k], shell.vertexCount());
+        if (shell.pinCount() > 0) {
+            part.setZero();
+            continue;
+        }
         const Eigen::VectorXd& mass = shell.masses();
-        const auto part = velocities.middleCols(offsets[k], shell.vertexCount());
         const Vec3 centre = shell.positions() * mass / mass.sum(), mean = part * mass / mass.sum();
         Mat3 inertia = Mat3::Zero();
         Vec3 spin = Vec3::Zero();
@@ -409,9 +412,8 @@ Points IslandSolver::Impl::rigidMotion(const IslandInput& input, const Points& v
         }
         const Vec3 omega = inertia.ldlt().solve(spin);
         for (int i = 0; i < shell.vertexCount(); ++i)
-            rigid.col(offsets[k] + i) = mean + omega.cross(Vec3(shell.positions().col(i) - centre));
+            part.col(i) = mean + omega.cross(Vec3(shell.positions().col(i) - centre));
     }
-    return rigid;
 }
 
 /// Twists of the dynamic bodies at the end of the step.
