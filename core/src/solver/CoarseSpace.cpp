@@ -130,7 +130,7 @@ JACKET_INLINE void addModes(Float4 r, const Float4* t, double* sums) {
 
 struct Galerkin {
     const int *patchStart, *members, *rowStart, *column, *target, *patchOf;
-    const int *besideStart, *besideColumn, *besideTarget;
+    const int *besideStart, *besideColumn, *scalarStart, *scalars;
     const float *blocks, *rowSums, *beside, *arms;
     const char *isHeld, *isNearHeld;  ///< see CoarseSpace
     double *sums, *besideSums;
@@ -194,32 +194,36 @@ JACKET_INLINE void addMomentAt(float s, Float4 ri, Float4 rj, float* moments) {
 JACKET_KERNEL void addScalars(const Galerkin& g, int patch) {
     Float4 own[4] = {};
     double ownSum = 0.0;
+    const auto unlessHeld = [&](int k) { return g.isHeld[g.besideColumn[k]] ? 0.0f : g.beside[k]; };
     for (int m = g.patchStart[patch]; m < g.patchStart[patch + 1]; ++m) {
-        const int i = g.members[m];
+        const int i = g.members[m], *start = g.scalarStart + 3 * i;
         if (m + kAhead < g.patchStart[patch + 1]) {
-            const int next = g.members[m + kAhead];
+            const int next = g.members[m + kAhead], *scalars = g.scalarStart + 3 * next;
             prefetch(g.beside + g.besideStart[next], g.beside + g.besideStart[next + 1]);
             prefetch(g.besideColumn + g.besideStart[next], g.besideColumn + g.besideStart[next + 1]);
-            prefetch(g.besideTarget + g.besideStart[next], g.besideTarget + g.besideStart[next + 1]);
+            prefetch(g.scalars + scalars[0], g.scalars + scalars[3]);
         }
         if (g.isHeld[i]) continue;
         const Float4 ri = load4(g.arms + 4 * i);
         float crossSum = 0.0f;  // of scalars to other patches
-        for (int k = g.besideStart[i]; k < g.besideStart[i + 1]; ++k) {
-            const int j = g.besideColumn[k], target = g.besideTarget[k];
-            if (g.isHeld[j]) continue;
-            const float s = g.beside[k];
-            const Float4 rj = load4(g.arms + 4 * j);
-            if (target == patch) {
-                if (j < i) addMoment(-s, rj - ri, rj - ri, own);
-                continue;
-            }
-            crossSum -= s;
-            ownSum -= s;
-            if (target < 0) continue;
-            addMomentAt(s, ri, rj, g.moments + kMoments * target);
-            g.besideSums[target] += s;
+        for (int at = start[0]; at < start[1]; ++at) {
+            const int k = g.scalars[at];
+            const Float4 arm = load4(g.arms + 4 * g.besideColumn[k]) - ri;
+            addMoment(-unlessHeld(k), arm, arm, own);
         }
+        for (int at = start[1]; at < start[2];) {
+            const int target = g.scalars[at + 1];
+            Float4 sum{};  // of s (r_j, 1)
+            for (; at < start[2] && g.scalars[at + 1] == target; at += 2) {
+                const int k = g.scalars[at];
+                sum += unlessHeld(k) * load4(g.arms + 4 * g.besideColumn[k]);
+            }
+            crossSum -= sum[3];
+            addMomentAt(1.0f, ri, sum, g.moments + kMoments * target);
+            g.besideSums[target] += sum[3];
+        }
+        for (int at = start[2]; at < start[3]; ++at) crossSum -= unlessHeld(g.scalars[at]);
+        ownSum += crossSum;
         addMoment(crossSum, ri, ri, own);
     }
     for (int c = 0; c < 4; ++c) store4(g.moments + kMoments * patch + 4 * c, own[c]);
@@ -270,14 +274,32 @@ CoarseSpace::CoarseSpace(const CompactMatrix& matrix)
 
 void CoarseSpace::findTargets(const CompactMatrix& matrix) {
     m_target.reserve(matrix.rowEnd(matrix.size() - 1));
-    m_besideTarget.reserve(matrix.besideEnd(matrix.size() - 1));
+    m_scalarStart.assign(1, 0);
+    std::vector<std::pair<int, int>> foreign;  // of another patch' block, and place
+    std::vector<int> mirrored;
     for (int row = 0; row < matrix.size(); ++row) {
         const int p = m_patchOf[row];
         for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k)
             m_target.push_back(m_factor.index(p, m_patchOf[matrix.column(k)]));
-        for (int k = matrix.besideBegin(row); k < matrix.besideEnd(row); ++k)
-            m_besideTarget.push_back(m_factor.index(p, m_patchOf[matrix.besideColumn(k)]));
+        foreign.clear();
+        mirrored.clear();
+        for (int k = matrix.besideBegin(row); k < matrix.besideEnd(row); ++k) {
+            const int column = matrix.besideColumn(k), target = m_factor.index(p, m_patchOf[column]);
+            if (target < 0)
+                mirrored.push_back(k);
+            else if (target != p)
+                foreign.push_back({target, k});
+            else if (column < row)
+                m_scalars.push_back(k);
+        }
+        m_scalarStart.push_back(static_cast<int>(m_scalars.size()));
+        std::sort(foreign.begin(), foreign.end());
+        for (const auto& [target, k] : foreign) m_scalars.insert(m_scalars.end(), {k, target});
+        m_scalarStart.push_back(static_cast<int>(m_scalars.size()));
+        m_scalars.insert(m_scalars.end(), mirrored.begin(), mirrored.end());
+        m_scalarStart.push_back(static_cast<int>(m_scalars.size()));
     }
+    m_scalars.shrink_to_fit();
 }
 
 void CoarseSpace::placeArms(const CompactMatrix& matrix, const Points& positions) {
@@ -353,11 +375,10 @@ void CoarseSpace::build(const CompactMatrix& matrix, const Points& positions, co
     m_moments.assign(kMoments * m_factor.blockCount(), 0.0f);
     m_besideSums.assign(m_factor.blockCount(), 0.0);
     const auto view = matrix.view();
-    const Galerkin g{m_patchStart.data(),   m_members.data(), view.rowStart,       view.column,
-                     m_target.data(),       m_patchOf.data(), view.besideStart,    view.besideColumn,
-                     m_besideTarget.data(), view.blocks,      view.rowSums,        view.beside,
-                     m_arms.data(),         m_isHeld.data(),  m_isNearHeld.data(), m_sums.data(),
-                     m_besideSums.data(),   m_moments.data()};
+    const Galerkin g{m_patchStart.data(), m_members.data(), view.rowStart,       view.column,          m_target.data(),
+                     m_patchOf.data(),    view.besideStart, view.besideColumn,   m_scalarStart.data(), m_scalars.data(),
+                     view.blocks,         view.rowSums,     view.beside,         m_arms.data(),        m_isHeld.data(),
+                     m_isNearHeld.data(), m_sums.data(),    m_besideSums.data(), m_moments.data()};
     runParts(team, patchCount(), [&](int patch) {
         addBlocks(g, patch);
         for (int m = m_patchStart[patch]; m < m_patchStart[patch + 1]; ++m)

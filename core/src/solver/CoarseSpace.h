@@ -42,8 +42,10 @@ class CoarseSpace {
     std::vector<int> m_patchOf;                ///< of each row; patches are numbered as they are eliminated
     std::vector<int> m_patchStart, m_members;  ///< rows of each patch
     BlockFactor m_factor;
-    std::vector<int> m_target;         ///< factor's block of each block of the matrix; -1: its mirror image has it
-    std::vector<int> m_besideTarget;   ///< the same of each scalar
+    std::vector<int> m_target;  ///< factor's block of each block of the matrix; -1: its mirror image has it
+    /// Of each row three groups of places of scalars: in the patch and below the diagonal; beyond it, each with the
+    /// factor's block; those whose mirror images are such.
+    std::vector<int> m_scalarStart, m_scalars;
     std::vector<char> m_isHeld;        ///< rows with a projector
     std::vector<char> m_isNearHeld;    ///< and those beside them
     std::vector<float> m_arms;         ///< of each row from its patch' centre over the patch' size, and 1
