@@ -58,6 +58,23 @@ TEST(BodySupports, APairLetsGoWhereItPullsAndComesBackOnce) {
     EXPECT_FALSE(supports.masses()[0].isApprox(joined));
 }
 
+/// What counts as a pull is measured by what the body itself weighs, however many contacts make it heavy.
+TEST(BodySupports, TheGroundLetsGoOfABodyThatAnotherOneTouches) {
+    std::vector<CoupledBody> bodies{falling(1), falling(1)};
+    const BodySupport ground[] = {{up(), 0.0, 1e4}};
+    bodies[0].supports = ground;
+    bodies[0].mass += 1e4 * up() * up().transpose();
+    Vec6 aslant = Vec6::Zero();
+    aslant.head<3>() = Vec3(1, 1, 1).normalized();
+    const RigidContact beside{.a = 0, .b = 1, .rowA = aslant, .rowB = -aslant, .weight = 1e4};
+    BodySupports supports;
+    supports.begin(bodies, {}, std::vector{beside}, {0, 1});
+    Eigen::Matrix<double, 6, Eigen::Dynamic> rising(6, 2);
+    rising << 5e-4 * up(), 5e-4 * up();  // the ground pulls by 5 N s, which is 50 times what gravity does in the step
+    EXPECT_TRUE(supports.update(rising, 0.1));
+    EXPECT_NEAR(supports.masses()[0](1, 1), 1.0 + 1e4 / 3, 1e-6);
+}
+
 TEST(BodySupports, AContactWithABodyOfPrescribedMotionDoesNothing) {
     const std::vector<CoupledBody> bodies{falling(1), falling(1)};
     BodySupports supports;

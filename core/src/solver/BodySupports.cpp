@@ -20,11 +20,15 @@ void BodySupports::begin(std::span<const CoupledBody> bodies, std::span<const Bo
     m_mass.clear();
     m_momentum.clear();
     m_freeTwist.clear();
+    m_lightest.clear();
     m_couplings.clear();
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         if (dynamicIndex[b] < 0) continue;
         for (const BodySupport& contact : bodies[b].supports)
             m_supports.push_back({.body = dynamicIndex[b], .contact = contact});
+        Vec3 own = bodies[b].mass.diagonal().head<3>();  // without what bears it
+        for (const BodySupport& contact : bodies[b].supports) own -= contact.weight * contact.row.head<3>().cwiseAbs2();
+        m_lightest.push_back(own.minCoeff());
         m_mass.push_back(bodies[b].mass);
         m_momentum.push_back(bodies[b].mass * bodies[b].freeTwist);
         m_freeTwist.push_back(bodies[b].freeTwist);
@@ -94,10 +98,6 @@ bool BodySupports::Hold::turn(double opening, double most) {
     return true;
 }
 
-double BodySupports::lightest(int body) const {
-    return m_mass[body].diagonal().head<3>().minCoeff();
-}
-
 /// Of each body what it rests on, or rests on it, bears most [N s]. A solve is only as exact as its largest impulses
 /// let it be: what it leaves of them is no pull.
 void BodySupports::findLoads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) {
@@ -121,7 +121,7 @@ bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, dou
     for (Support& support : m_supports) {
         const auto& [row, velocity, weight] = support.contact;
         const double opening = row.dot(w.col(support.body)) - velocity;
-        const double pull = kPull * std::max(lightest(support.body) * kick, load[support.body]);
+        const double pull = kPull * std::max(m_lightest[support.body] * kick, load[support.body]);
         if (!support.hold.turn(opening, pull / weight)) continue;
         const double sign = support.hold.holds ? 1.0 : -1.0;
         m_mass[support.body] += sign * weight * row * row.transpose();
@@ -132,7 +132,7 @@ bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, dou
     for (Pair& pair : m_pairs) {
         const auto& [a, b, rowA, rowB, weight] = pair.contact;
         const double opening = rowA.dot(w.col(a)) + rowB.dot(w.col(b));
-        const double pull = kPull * std::max(std::min(lightest(a), lightest(b)) * kick, std::min(load[a], load[b]));
+        const double pull = kPull * std::max(std::min(m_lightest[a], m_lightest[b]) * kick, std::min(load[a], load[b]));
         if (!pair.hold.turn(opening, pull / weight)) continue;
         add(pair, pair.hold.holds ? 1.0 : -1.0);
         changed = true;

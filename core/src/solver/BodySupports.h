@@ -40,7 +40,6 @@ class BodySupports {
     };
 
     void add(const Pair& pair, double sign);
-    double lightest(int body) const;
     void findLoads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w);
     void solveFreeTwists();
 
@@ -50,8 +49,9 @@ class BodySupports {
     std::vector<Vec6> m_momentum, m_freeTwist;
     std::vector<BodyCoupling> m_couplings;  ///< those that were given, then one for each pair
     std::size_t m_givenCouplings = 0;
-    std::vector<double> m_loads;  ///< see findLoads [N s]
-    std::vector<int> m_place;     ///< of each body in the common mass matrix, -1: it stands alone
+    std::vector<double> m_lightest;  ///< of each body its own mass, along the axis where that is least [kg]
+    std::vector<double> m_loads;     ///< see findLoads [N s]
+    std::vector<int> m_place;        ///< of each body in the common mass matrix, -1: it stands alone
     struct CommonMass {
         Eigen::MatrixXd matrix;
         Eigen::VectorXd momentum;
