@@ -1,6 +1,7 @@
 #include "CarriedVertices.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 
 #include "ObjectId.h"
@@ -20,15 +21,19 @@ Eigen::Matrix<double, 3, 6> motionOf(const Vec3& arm) {
 
 }  // namespace
 
-void CarriedVertices::add(ShellBody& shell, int vertex, const Obstacle& obstacle, const Vec6& twist,
-                          const Vec3* anchor) {
-    std::optional<Vec3> local;
-    if (anchor) local = obstacle.start.inverse(Eigen::Isometry) * *anchor;
+void CarriedVertices::addTouching(ShellBody& shell, int vertex, const Obstacle& obstacle, const Vec6& twist,
+                                  const Vec3& normal) {
     m_vertices.push_back({&shell, vertex, obstacle.object, obstacle.object->getBroadphaseHandle()->getUid(),
-                          obstacle.start, twist, local});
+                          obstacle.start, twist, std::nullopt, normal});
 }
 
-void CarriedVertices::move(const btCollisionWorld& world, double h) {
+void CarriedVertices::addTied(ShellBody& shell, int vertex, const Obstacle& obstacle, const Vec6& twist,
+                              const Vec3& point) {
+    m_vertices.push_back({&shell, vertex, obstacle.object, obstacle.object->getBroadphaseHandle()->getUid(),
+                          obstacle.start, twist, obstacle.start.inverse(Eigen::Isometry) * point, Vec3::Zero()});
+}
+
+void CarriedVertices::move(const btCollisionWorld& world, const Vec3& gravity, double h) {
     m_shells.clear();
     for (const Carried& carried : m_vertices)
         if (!carried.shell->isAsleep() && std::find(m_shells.begin(), m_shells.end(), carried.shell) == m_shells.end())
@@ -36,7 +41,10 @@ void CarriedVertices::move(const btCollisionWorld& world, double h) {
     for (ShellBody* body : m_shells) {
         findShifts(*body, world, h);
         Shell& shell = body->m_shell;
-        if (shell.isStiff(h)) moveAsOne(*body, m_shifts);
+        if (shell.isStiff(h))
+            moveAsOne(*body, m_shifts);
+        else
+            spare(*body, gravity, h);
         for (const auto& [carried, by] : m_shifts) shell.displace(carried->vertex, by);
     }
     m_vertices.clear();
@@ -53,10 +61,44 @@ void CarriedVertices::findShifts(const ShellBody& shell, const btCollisionWorld&
     }
 }
 
+/// Where bodies have done something else by far, what touches them would strain the shell by it, by any amount. It goes
+/// along as far as that does not double the shell's energy, and if it cannot go all of the way, along the normals
+/// alone: what is left of the way the next solve sees, as a gap or a depth, with what it costs.
+void CarriedVertices::spare(const ShellBody& body, const Vec3& gravity, double h) {
+    constexpr double kNeighbourhood = 4.0;  // stiffness against moving one vertex alone, in E t
+    constexpr int kMostHalvings = 6;
+    const Shell& shell = body.m_shell;
+    double stretching = 0.0;
+    for (const auto& [carried, by] : m_shifts)
+        if (!carried->anchor)
+            stretching += 0.5 * kNeighbourhood * shell.material().stretchStiffness() * by.squaredNorm();
+    if (stretching == 0.0) return;
+    const double moving = 0.5 * shell.masses().dot(shell.velocities().colwise().squaredNorm().transpose()) +
+                          0.5 * shell.masses().sum() * (h * gravity).squaredNorm();
+    if (stretching <= moving) return;
+    const double before = energyAfter(shell, 0.0), most = moving + 2.0 * before;
+    if (energyAfter(shell, 1.0) <= most) return;
+    for (auto& [carried, by] : m_shifts)
+        if (!carried->anchor) by = carried->normal.dot(by) * carried->normal;
+    double share = 1.0;
+    for (int halving = 0; halving < kMostHalvings && energyAfter(shell, share) > most; ++halving) share *= 0.5;
+    if (energyAfter(shell, share) > most) share = 0.0;
+    for (auto& [carried, by] : m_shifts)
+        if (!carried->anchor) by *= share;
+}
+
+/// Elastic, when what is tied has gone all of its way and what touches a share of it [J].
+double CarriedVertices::energyAfter(const Shell& shell, double share) {
+    m_at = shell.positions();
+    for (const auto& [carried, by] : m_shifts) m_at.col(carried->vertex) += (carried->anchor ? 1.0 : share) * by;
+    return shell.elasticEnergy(m_at);
+}
+
 /// The vertices of a stiff shell move together, or contacts would bend it: the rigid motion that is nearest to what
 /// those that touch are to do, the least one of them. What is tied to a body has the rest of its way to go.
 void CarriedVertices::moveAsOne(ShellBody& body, std::vector<Shift>& shifts) {
     constexpr double kInertia = 1e-6;  // weight of the vertices that are not carried
+    constexpr double kMostTurn = 0.2;  // [rad]
     Shell& shell = body.m_shell;
     const Points& x = shell.positions();
     const Vec3 centre = x.rowwise().mean();
@@ -71,11 +113,17 @@ void CarriedVertices::moveAsOne(ShellBody& body, std::vector<Shift>& shifts) {
         matrix += rows.transpose() * rows;
         rhs += rows.transpose() * by;
     }
-    const Vec6 motion = shell.pinCount() > 0 ? Vec6(Vec6::Zero()) : Vec6(matrix.ldlt().solve(rhs));
+    Vec6 motion = shell.pinCount() > 0 ? Vec6(Vec6::Zero()) : Vec6(matrix.ldlt().solve(rhs));
+    const double angle = motion.tail<3>().norm();
+    if (angle > kMostTurn) motion *= kMostTurn / angle;
+    const Mat3 turn = Eigen::AngleAxisd(std::min(angle, kMostTurn), motion.tail<3>().normalized()).toRotationMatrix();
+    const auto way = [&](int i) -> Vec3 {  // a turn that is none to first order alone: that would stretch the shell
+        const Vec3 arm = x.col(i) - centre;
+        return motion.head<3>() + turn * arm - arm;
+    };
     std::erase_if(shifts, [](const Shift& shift) { return !shift.carried->anchor; });
-    for (auto& [carried, by] : shifts) by -= motionOf(x.col(carried->vertex) - centre) * motion;
-    for (int i = 0; i < shell.vertexCount() && shell.pinCount() == 0; ++i)
-        shell.displace(i, motionOf(x.col(i) - centre) * motion);
+    for (auto& [carried, by] : shifts) by -= way(carried->vertex);
+    for (int i = 0; i < shell.vertexCount() && shell.pinCount() == 0; ++i) shell.displace(i, way(i));
 }
 
 }  // namespace jacket::bullet

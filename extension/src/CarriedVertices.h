@@ -11,11 +11,12 @@ namespace jacket::bullet {
 /// else than the solve assumed: the vertices are taken along.
 class CarriedVertices {
   public:
-    /// `twist`: of the solve. `anchor`: where the vertex is tied to the body, in the world, at the start of the step;
-    /// null: it touches it.
-    void add(ShellBody& shell, int vertex, const Obstacle& obstacle, const Vec6& twist, const Vec3* anchor);
+    /// A vertex that touches the body. `twist`: of the solve; `normal`: out of the body.
+    void addTouching(ShellBody& shell, int vertex, const Obstacle& obstacle, const Vec6& twist, const Vec3& normal);
+    /// A vertex that is tied to the body at `point`, in the world, at the start of the step.
+    void addTied(ShellBody& shell, int vertex, const Obstacle& obstacle, const Vec6& twist, const Vec3& point);
     /// After the shells have moved by what was solved for. Forgets them all.
-    void move(const btCollisionWorld& world, double h);
+    void move(const btCollisionWorld& world, const Vec3& gravity, double h);
     void clear() { m_vertices.clear(); }
 
   private:
@@ -26,7 +27,8 @@ class CarriedVertices {
         int objectId;
         Frame start;
         Vec6 twist;
-        std::optional<Vec3> anchor;  ///< in the body's frame
+        std::optional<Vec3> anchor;  ///< in the body's frame; none: it touches the body
+        Vec3 normal;                 ///< of what touches
     };
     /// Where a vertex is to be moved.
     struct Shift {
@@ -35,10 +37,13 @@ class CarriedVertices {
     };
     void findShifts(const ShellBody& shell, const btCollisionWorld& world, double h);
     static void moveAsOne(ShellBody& shell, std::vector<Shift>& shifts);
+    void spare(const ShellBody& shell, const Vec3& gravity, double h);
+    double energyAfter(const Shell& shell, double share);
 
     std::vector<Carried> m_vertices;
     std::vector<ShellBody*> m_shells;  ///< that have any
     std::vector<Shift> m_shifts;       ///< of one of them
+    Points m_at;                       ///< where they would lead it
 };
 
 }  // namespace jacket::bullet

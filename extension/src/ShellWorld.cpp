@@ -262,7 +262,7 @@ void ShellWorld::solveNewcomers(btCollisionWorld& world, double h) {
 void ShellWorld::moveShells(btCollisionWorld& world, double h) {
     for (const auto& shell : m_shells)
         if (shell->m_hasVelocity && !shell->isAsleep()) shell->m_shell.advance(h);
-    m_impl->carried.move(world, h);
+    m_impl->carried.move(world, fromBullet(m_impl->gravity), h);
     for (const auto& shell : m_shells)
         if (!shell->isAsleep()) shell->publish();
 }
@@ -319,22 +319,19 @@ void ShellWorld::accept(Island& island, const StepReport& report, std::span<cons
     for (const ContactImpulse& impulse : report.contacts) {
         ShellBody& shell = *island.shells[impulse.contact.shell];
         shell.note(shell.describe(impulse, *island.obstacles[impulse.contact.body].object));
-        if (impulse.contact.isVertex())
-            carry(shell, impulse.contact.vertices[0], island, impulse.contact.body, coupled, nullptr);
+        const auto& [contact, given, sticks, slip] = impulse;
+        if (const Obstacle& obstacle = island.obstacles[contact.body];
+            contact.isVertex() && !standsStill(*obstacle.object))
+            m_impl->carried.addTouching(shell, contact.vertices[0], obstacle, coupled[contact.body].twist,
+                                        contact.normal);
     }
     for (const Anchor& anchor : island.anchors)
-        carry(*island.shells[anchor.shell], anchor.vertex, island, anchor.body, coupled, &anchor.point);
+        m_impl->carried.addTied(*island.shells[anchor.shell], anchor.vertex, island.obstacles[anchor.body],
+                                coupled[anchor.body].twist, anchor.point);
     for (std::size_t b = 0; b < coupled.size(); ++b) {
         react(*island.obstacles[b].object, coupled[b]);
         if (!report.passed) m_impl->solved[island.obstacles[b].object] = coupled[b].twist;
     }
-}
-
-void ShellWorld::carry(ShellBody& shell, int vertex, const Island& island, int body,
-                       std::span<const CoupledBody> coupled, const Vec3* anchor) {
-    const Obstacle& obstacle = island.obstacles[body];
-    if (standsStill(*obstacle.object) && !anchor) return;
-    m_impl->carried.add(shell, vertex, obstacle, coupled[body].twist, anchor);
 }
 
 void ShellWorld::react(btCollisionObject& object, const CoupledBody& coupled) {

@@ -86,8 +86,6 @@ class ShellWorld : public btActionInterface {
     void solveIsland(Island& island, double h);
     void accept(Island& island, const StepReport& report, std::span<const CoupledBody> coupled,
                 const Vec3& pendingGravity);
-    void carry(ShellBody& shell, int vertex, const Island& island, int body, std::span<const CoupledBody> coupled,
-               const Vec3* anchor);
     void react(btCollisionObject& object, const CoupledBody& coupled);
     void forgetPushes(const btCollisionWorld& world);
     void updateAllBounds(double h);
