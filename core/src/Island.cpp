@@ -63,6 +63,12 @@ bool isToBeFactored(const Shell& shell, double h, bool isNearBodies, bool givesW
     return n <= kTiny ? shell.isStiffAsAWhole(h) : shell.isStiff(h);
 }
 
+/// Of a shell that is strained by as much everywhere [J].
+double strainEnergy(const Shell& shell, double strain) {
+    const double area = shell.masses().sum() / shell.material().areaDensity();
+    return 0.5 * shell.material().stretchStiffness() * area * strain * strain;
+}
+
 using BodyVectors = Eigen::Matrix<double, 6, Eigen::Dynamic>;  ///< twists or momenta
 
 /// By how much damping makes a mass harder to move.
@@ -117,6 +123,7 @@ struct IslandSolver::Impl {
     bool overstretches(const IslandInput& input, bool isAgain) const;
     double elasticEnergyAfter(const IslandInput& input, std::size_t shell, const Points& velocities) const;
     double energyGain(const IslandInput& input) const;
+    double energyOfMotion(const IslandInput& input, std::size_t shell) const;
     bool bodiesLead(const IslandInput& input) const;
     void limitDeformation(const IslandInput& input, StepReport& report);
     void blend(const IslandInput& input, const Points& other);
@@ -327,10 +334,11 @@ double IslandSolver::Impl::elasticEnergyAfter(const IslandInput& input, std::siz
 
 /// Whether the solved step must be linearised again: it stretches an edge by far, or it gains energy. Backward Euler
 /// itself gains none; its one linear solve does where stiff shells turn far in a step. That is looked for only where
-/// edges change their lengths at all; `isAgain`: in a step that has been linearised again, for much of it in any case.
+/// edges change their lengths at all; `isAgain`: in a step that has been linearised again, for much of it in any case,
+/// and so where little strain may be much energy, as in sheet metal.
 bool IslandSolver::Impl::overstretches(const IslandInput& input, bool isAgain) const {
     constexpr double kMost = 0.1, kSuspect = 1e-3;  // change of an edge in one step, in rest lengths
-    bool isSuspect = false;
+    bool isSuspect = false, isToBeAsked = isAgain;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         const auto edges = shell.mesh().edges();
@@ -338,8 +346,9 @@ bool IslandSolver::Impl::overstretches(const IslandInput& input, bool isAgain) c
                                                 shell.positions().data(), v.data() + 3 * offsets[k], stepOf[k]);
         if (stretch.lengthening > kMost) return true;
         isSuspect = isSuspect || stretch.change > kSuspect;
+        isToBeAsked = isToBeAsked || strainEnergy(shell, stretch.change) > energyOfMotion(input, k);
     }
-    if (!isSuspect) return isAgain && energyGain(input) > kMostEnergyGain;
+    if (!isSuspect) return isToBeAsked && energyGain(input) > kMostEnergyGain;
     return energyGain(input) > (dynamicBodies.empty() ? kEnergyGainAlone : kEnergyGain);
 }
 
@@ -469,6 +478,14 @@ bool IslandSolver::Impl::bodiesLead(const IslandInput& input) const {
     for (const int b : dynamicBodies)
         inBodies += 0.5 * input.bodies[b].freeTwist.dot(input.bodies[b].mass * input.bodies[b].freeTwist);
     return inBodies > inShells;
+}
+
+/// Of a shell at the start of the step, or what gravity would give it in one [J].
+double IslandSolver::Impl::energyOfMotion(const IslandInput& input, std::size_t k) const {
+    const Eigen::VectorXd& masses = input.shells[k]->masses();
+    const auto before = from.middleCols(offsets[k], input.shells[k]->vertexCount());
+    return 0.5 * masses.dot(before.colwise().squaredNorm().transpose()) +
+           0.5 * masses.sum() * (stepOf[k] * input.gravity).squaredNorm();
 }
 
 /// What shells and bodies gain in the solved step besides what gravity, forces and moved supports do, over the energy
