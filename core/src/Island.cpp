@@ -1,12 +1,14 @@
 #include "jacket/Island.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory_resource>
 #include <stdexcept>
+#include <utility>
 
 #include "EdgeStretch.h"
 #include "ShellAssembly.h"
@@ -126,11 +128,13 @@ struct IslandSolver::Impl {
     double energyOfMotion(const IslandInput& input, std::size_t shell) const;
     bool bodiesLead(const IslandInput& input) const;
     void limitDeformation(const IslandInput& input, StepReport& report);
+    void limitPushes(const IslandInput& input);
+    double gainOfCoasting(const IslandInput& input);
     void blend(const IslandInput& input, const Points& other);
     void coast(const IslandInput& input, const Points& coasting);
     double shareWithin(const CoupledBody& body, int dynamic, double speed) const;
     void limitBodies(const IslandInput& input, StepReport& report);
-    void makeRigid(const IslandInput& input, Points& velocities) const;
+    void makeRigid(const IslandInput& input, Points& velocities, double time) const;
     const BodyVectors& endTwists() const;
     bool improves(const IslandInput& input);
     double incrementalPotential(const IslandInput& input, const Points& velocities) const;
@@ -359,22 +363,54 @@ bool IslandSolver::Impl::overstretches(const IslandInput& input, bool isAgain) c
 void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& report) {
     constexpr int kMostHalvings = 40;
     report.limited = true;
+    limitPushes(input);
+    const double most = std::max(kEnergyGain, gainOfCoasting(input));
     rigid = v;
-    makeRigid(input, rigid);
+    makeRigid(input, rigid, input.h);
     const bool isHeld =
         std::any_of(input.shells.begin(), input.shells.end(), [](const Shell* shell) { return shell->pinCount() > 0; });
-    for (int halving = 0; halving < kMostHalvings && energyGain(input) > kEnergyGain; ++halving) {
+    for (int halving = 0; halving < kMostHalvings && energyGain(input) > most; ++halving) {
         blend(input, rigid);
         if (isHeld) impulseShare *= 0.5;  // its pins take the momentum; a light body would keep the shell's old speed
     }
     rigid = start.colwise() + input.h * input.gravity;
-    makeRigid(input, rigid);  // coasting
-    for (int halving = 0; halving < kMostHalvings && energyGain(input) > kEnergyGain; ++halving) {
+    makeRigid(input, rigid, input.h);  // coasting
+    for (int halving = 0; halving < kMostHalvings && energyGain(input) > most; ++halving) {
         blend(input, rigid);
         impulseShare *= 0.5;
     }
-    if (!(energyGain(input) <= kEnergyGain)) coast(input, rigid);
+    if (!(energyGain(input) <= most)) coast(input, rigid);
     for (std::size_t b = 0; impulseShare < 1.0 && b < input.bodies.size(); ++b) response.forget(static_cast<int>(b));
+}
+
+/// What moves vertices out of bodies goes half way to a rigid motion until it no longer more than doubles the energy:
+/// their neighbours will not give way as they were to, and may turn with the shell.
+void IslandSolver::Impl::limitPushes(const IslandInput& input) {
+    constexpr int kMostHalvings = 40;
+    reached = y;
+    makeRigid(input, reached, 1.0);
+    rigid = start.colwise() + input.h * input.gravity;
+    makeRigid(input, rigid, input.h);
+    double most = 0.0;
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        most += elasticAtStart[k] + kMostEnergyGain * (elasticAtStart[k] + energyOfMotion(input, k));
+    const auto energyAfter = [&] {
+        double sum = 0.0;
+        for (std::size_t k = 0; k < input.shells.size(); ++k) sum += elasticEnergyAfter(input, k, rigid);
+        return sum;
+    };
+    for (int halving = 0; halving < kMostHalvings && energyAfter() > most; ++halving) y = 0.5 * (y + reached);
+}
+
+/// Of a step in which shells take nothing from their contacts but what moves them out of bodies: see energyGain.
+double IslandSolver::Impl::gainOfCoasting(const IslandInput& input) {
+    reached = v;
+    v = start.colwise() + input.h * input.gravity;
+    makeRigid(input, v, input.h);
+    const double share = std::exchange(impulseShare, 0.0), gain = energyGain(input);
+    impulseShare = share;
+    v.swap(reached);
+    return gain;
 }
 
 /// Half way from the solved velocities to others, where vertices are free.
@@ -401,8 +437,9 @@ void IslandSolver::Impl::coast(const IslandInput& input, const Points& coasting)
     impulseShare = 0.0;
 }
 
-/// Leaves of velocities the rigid motion of each shell with their momentum; none of shells that are held.
-void IslandSolver::Impl::makeRigid(const IslandInput& input, Points& velocities) const {
+/// Leaves of velocities the rigid motion of each shell with their momentum; none of shells that are held. It is what
+/// leads them in `time` to where they have turned: along the tangents they would be stretched.
+void IslandSolver::Impl::makeRigid(const IslandInput& input, Points& velocities, double time) const {
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         auto part = velocities.middleCols(offsets[k], shell.vertexCount());
@@ -420,8 +457,9 @@ void IslandSolver::Impl::makeRigid(const IslandInput& input, Points& velocities)
             spin += mass[i] * r.cross(Vec3(part.col(i)));
         }
         const Vec3 omega = inertia.ldlt().solve(spin);
-        for (int i = 0; i < shell.vertexCount(); ++i)
-            part.col(i) = mean + omega.cross(Vec3(shell.positions().col(i) - centre));
+        const Mat3 turn = Eigen::AngleAxisd(time * omega.norm(), omega.normalized()).toRotationMatrix();
+        const Mat3 chord = (turn - Mat3::Identity()) / time;
+        for (int i = 0; i < shell.vertexCount(); ++i) part.col(i) = mean + chord * (shell.positions().col(i) - centre);
     }
 }
 
