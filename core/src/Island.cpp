@@ -1,6 +1,7 @@
 #include "jacket/Island.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -71,6 +72,18 @@ double strainEnergy(const Shell& shell, double strain) {
     return 0.5 * shell.material().stretchStiffness() * area * strain * strain;
 }
 
+/// Whether other bodies or joints hold it in some directions: its mass against a force at its centre is by far less in
+/// the one that it yields to most than in others.
+bool isHeldInSome(const Mat6& mass) {
+    constexpr double kMost = 0.1;
+    const Mat3 coupling = mass.topRightCorner<3, 3>();
+    const Mat3 moved =
+        mass.topLeftCorner<3, 3>() - coupling * mass.bottomRightCorner<3, 3>().ldlt().solve(Mat3(coupling.transpose()));
+    Eigen::SelfAdjointEigenSolver<Mat3> modes;
+    return modes.computeDirect(moved, Eigen::EigenvaluesOnly).eigenvalues()[0] <
+           kMost * mass.topLeftCorner<3, 3>().trace() / 3.0;
+}
+
 using BodyVectors = Eigen::Matrix<double, 6, Eigen::Dynamic>;  ///< twists or momenta
 
 /// By how much damping makes a mass harder to move.
@@ -107,7 +120,7 @@ struct IslandSolver::Impl {
         momentum;                                ///< of the bodies: twists at the end of the step, and momenta
     bool unsettled = false;                      ///< contacts of this step have used up their rounds
     int lastRounds = 1;                          ///< changes of the contacts in the last step, and one
-    mutable Points at;                           ///< where velocities lead one shell
+    mutable std::vector<Points> at;              ///< where velocities lead each shell
     Points rigid;                                ///< velocities of shells that do not deform
     mutable std::vector<double> elasticAtStart;  ///< of each shell at the start of the step; NaN: not yet asked for [J]
     StepTimes times;                             ///< of the step so far
@@ -132,7 +145,7 @@ struct IslandSolver::Impl {
     double gainOfCoasting(const IslandInput& input);
     void blend(const IslandInput& input, const Points& other);
     void coast(const IslandInput& input, const Points& coasting);
-    double shareWithin(const CoupledBody& body, int dynamic, double speed) const;
+    double shareWithin(const IslandInput& input, const CoupledBody& body, int dynamic, double speed) const;
     void limitBodies(const IslandInput& input, StepReport& report);
     void makeRigid(const IslandInput& input, Points& velocities, double time) const;
     const BodyVectors& endTwists() const;
@@ -209,8 +222,12 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
     }
     start.resize(3, count);
     rigid.resize(3, count);
-    for (std::size_t k = 0; k < input.shells.size(); ++k)
-        start.middleCols(offsets[k], input.shells[k]->vertexCount()) = input.shells[k]->velocities();
+    at.resize(std::max(at.size(), input.shells.size()));
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        const int n = input.shells[k]->vertexCount();
+        start.middleCols(offsets[k], n) = input.shells[k]->velocities();
+        at[k].resize(3, n);
+    }
     y.setZero(3, count);
     from = start;
     stepOf.assign(input.shells.size(), input.h);
@@ -332,8 +349,8 @@ double IslandSolver::Impl::incrementalPotential(const IslandInput& input, const 
 double IslandSolver::Impl::elasticEnergyAfter(const IslandInput& input, std::size_t k, const Points& velocities) const {
     const Shell& shell = *input.shells[k];
     const int n = shell.vertexCount();
-    at = shell.positions() + y.middleCols(offsets[k], n) + stepOf[k] * velocities.middleCols(offsets[k], n);
-    return shell.elasticEnergy(at);
+    at[k] = shell.positions() + y.middleCols(offsets[k], n) + stepOf[k] * velocities.middleCols(offsets[k], n);
+    return shell.elasticEnergy(at[k]);
 }
 
 /// Whether the solved step must be linearised again: it stretches an edge by far, or it gains energy. Backward Euler
@@ -470,16 +487,24 @@ const BodyVectors& IslandSolver::Impl::endTwists() const {
 }
 
 /// The largest share of its solved change of twist with which a body keeps within its energy without the shells and
-/// that of its mass at `speed`.
-double IslandSolver::Impl::shareWithin(const CoupledBody& body, int dynamic, double speed) const {
+/// that of its mass at `speed`. Where it is held in some directions, that mass says nothing of the others: there its
+/// speed is asked for too, besides what gravity may do to it.
+double IslandSolver::Impl::shareWithin(const IslandInput& input, const CoupledBody& body, int dynamic,
+                                       double speed) const {
     constexpr int kMostHalvings = 40;
     const Vec6 before = freeTwist.col(dynamic), change = impulseShare * (u.w.col(dynamic) - before);
     const auto energy = [&](const Vec6& twist) { return 0.5 * twist.dot(body.mass * twist); };
     const double mass = body.mass.topLeftCorner<3, 3>().trace() / 3.0;
     const double most = std::max(energy(body.freeTwist), energy(before)) + 0.5 * mass * speed * speed;
+    double most2 = std::numeric_limits<double>::infinity();
+    if (isHeldInSome(body.mass))
+        most2 = std::max(body.freeTwist.head<3>().squaredNorm(), before.head<3>().squaredNorm()) + speed * speed +
+                (input.h * input.gravity).squaredNorm();
     double share = 1.0;
-    for (int i = 0; i < kMostHalvings; ++i, share *= 0.5)
-        if (energy(before + share * change) <= most) return share;
+    for (int i = 0; i < kMostHalvings; ++i, share *= 0.5) {
+        const Vec6 after = before + share * change;
+        if (energy(after) <= most && after.head<3>().squaredNorm() <= most2) return share;
+    }
     return 0.0;
 }
 
@@ -496,7 +521,7 @@ void IslandSolver::Impl::limitBodies(const IslandInput& input, StepReport& repor
                                             [&](const auto& anchor) { return anchor.body == body; });
         if (isAnchored || !(speeds[body] >= 0.0)) continue;
         const double speed = (isSure ? kMostOvertaking : 1.0) * speeds[body];
-        bodyShare[b] = shareWithin(input.bodies[body], static_cast<int>(b), speed);
+        bodyShare[b] = shareWithin(input, input.bodies[body], static_cast<int>(b), speed);
         least = std::min(least, bodyShare[b]);
         if (bodyShare[b] < 1.0) response.forget(body);
     }

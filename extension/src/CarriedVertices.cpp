@@ -23,6 +23,7 @@ Eigen::Matrix<double, 3, 6> motionOf(const Vec3& arm) {
 
 void CarriedVertices::addTouching(ShellBody& shell, int vertex, const Obstacle& obstacle, const Vec6& twist,
                                   const Vec3& normal) {
+    shell.m_ahead.resize(3, shell.m_shell.vertexCount());  // now, or a later step would ask for it
     m_vertices.push_back({&shell, vertex, obstacle.object, obstacle.object->getBroadphaseHandle()->getUid(),
                           obstacle.start, twist, std::nullopt, normal});
 }
@@ -64,7 +65,7 @@ void CarriedVertices::findShifts(const ShellBody& shell, const btCollisionWorld&
 /// Where bodies have done something else by far, what touches them would strain the shell by it, by any amount. It goes
 /// along as far as that does not double the shell's energy, and if it cannot go all of the way, along the normals
 /// alone: what is left of the way the next solve sees, as a gap or a depth, with what it costs.
-void CarriedVertices::spare(const ShellBody& body, const Vec3& gravity, double h) {
+void CarriedVertices::spare(ShellBody& body, const Vec3& gravity, double h) {
     constexpr double kNeighbourhood = 4.0;  // stiffness against moving one vertex alone, in E t
     constexpr int kMostHalvings = 6;
     const Shell& shell = body.m_shell;
@@ -76,22 +77,23 @@ void CarriedVertices::spare(const ShellBody& body, const Vec3& gravity, double h
     const double moving = 0.5 * shell.masses().dot(shell.velocities().colwise().squaredNorm().transpose()) +
                           0.5 * shell.masses().sum() * (h * gravity).squaredNorm();
     if (stretching <= moving) return;
-    const double before = energyAfter(shell, 0.0), most = moving + 2.0 * before;
-    if (energyAfter(shell, 1.0) <= most) return;
+    const double before = energyAfter(body, 0.0), most = moving + 2.0 * before;
+    if (energyAfter(body, 1.0) <= most) return;
     for (auto& [carried, by] : m_shifts)
         if (!carried->anchor) by = carried->normal.dot(by) * carried->normal;
     double share = 1.0;
-    for (int halving = 0; halving < kMostHalvings && energyAfter(shell, share) > most; ++halving) share *= 0.5;
-    if (energyAfter(shell, share) > most) share = 0.0;
+    for (int halving = 0; halving < kMostHalvings && energyAfter(body, share) > most; ++halving) share *= 0.5;
+    if (energyAfter(body, share) > most) share = 0.0;
     for (auto& [carried, by] : m_shifts)
         if (!carried->anchor) by *= share;
 }
 
 /// Elastic, when what is tied has gone all of its way and what touches a share of it [J].
-double CarriedVertices::energyAfter(const Shell& shell, double share) {
-    m_at = shell.positions();
-    for (const auto& [carried, by] : m_shifts) m_at.col(carried->vertex) += (carried->anchor ? 1.0 : share) * by;
-    return shell.elasticEnergy(m_at);
+double CarriedVertices::energyAfter(ShellBody& body, double share) const {
+    body.m_ahead = body.m_shell.positions();
+    for (const auto& [carried, by] : m_shifts)
+        body.m_ahead.col(carried->vertex) += (carried->anchor ? 1.0 : share) * by;
+    return body.m_shell.elasticEnergy(body.m_ahead);
 }
 
 /// The vertices of a stiff shell move together, or contacts would bend it: the rigid motion that is nearest to what

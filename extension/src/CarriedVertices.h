@@ -37,13 +37,12 @@ class CarriedVertices {
     };
     void findShifts(const ShellBody& shell, const btCollisionWorld& world, double h);
     static void moveAsOne(ShellBody& shell, std::vector<Shift>& shifts);
-    void spare(const ShellBody& shell, const Vec3& gravity, double h);
-    double energyAfter(const Shell& shell, double share);
+    void spare(ShellBody& shell, const Vec3& gravity, double h);
+    double energyAfter(ShellBody& shell, double share) const;
 
     std::vector<Carried> m_vertices;
     std::vector<ShellBody*> m_shells;  ///< that have any
     std::vector<Shift> m_shifts;       ///< of one of them
-    Points m_at;                       ///< where they would lead it
 };
 
 }  // namespace jacket::bullet

@@ -134,6 +134,7 @@ class ShellBody {
     void note(const BodyContact& contact);
     std::vector<btVector3> m_positions;
     mutable std::vector<btVector3> m_normals;
+    Points m_ahead;  ///< where vertices that touch would be taken along to; empty until one does [m]
     void publish();  ///< copies positions for drawing
     void anchorTo(int vertex, btCollisionObject& body);
     void fallAsleep();
