@@ -1,10 +1,10 @@
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <filesystem>
 #include <iostream>
 #include <optional>
 
 #include "Commands.h"
+#include "Interrupt.h"
 #include "Progress.h"
 #include "Recorder.h"
 #include "Result.h"
@@ -18,8 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kMarker = "report.json";
-
-volatile std::sig_atomic_t interrupted = 0;
 
 struct ReportOptions {
     std::string out;
@@ -45,15 +43,10 @@ void writeReport(const fs::path& folder, const report::Report& result) {
     writeText(folder / "index.html", report::pageOf(result));
 }
 
-int endInterrupted(const ReportOptions& options) {
-    std::cerr << "jacket: interrupted" << (options.out.empty() ? "" : "; nothing was written") << '\n';
-    return kInterrupted;
-}
-
 int printReferences(const ReportOptions& options) {
     std::cerr << "jacket: computing references; this takes minutes\n";
-    const std::string lines = accuracy::computeReferences([](int, int) { return interrupted == 0; });
-    if (interrupted) return endInterrupted(options);
+    const std::string lines = accuracy::computeReferences([](int, int) { return !isInterrupted(); });
+    if (isInterrupted()) return endInterrupted(!options.out.empty());
     std::cout << lines;
     return kOk;
 }
@@ -65,10 +58,10 @@ int makeReport(const ReportOptions& options) {
     const report::Report result = report::makeReport(options.quick, [&](int done, int all) {
         if (!progress) progress.emplace(std::cerr, Progress::styleFor(options.quiet), "report", all);
         progress->update(done);
-        return interrupted == 0;
+        return !isInterrupted();
     });
     progress.reset();
-    if (interrupted) return endInterrupted(options);
+    if (isInterrupted()) return endInterrupted(!options.out.empty());
     if (directory) {
         writeReport(directory->folder(), result);
         directory->commit();
@@ -92,8 +85,7 @@ void addReportCommand(CLI::App& app, int& exitCode) {
     command->footer("Example:  jacket report --quick --out out/report");
     command->callback([options, command, &exitCode] {
         if (command->count("--out")) OutputDirectory::requireFree(options->out, kMarker);
-        std::signal(SIGINT, [](int) { interrupted = 1; });
-        std::signal(SIGTERM, [](int) { interrupted = 1; });
+        catchInterrupts();
         exitCode = options->reference ? printReferences(*options) : makeReport(*options);
     });
 }

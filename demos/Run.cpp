@@ -1,13 +1,13 @@
 #include "Run.h"
 
 #include <algorithm>
-#include <csignal>
 #include <cstdio>
 #include <iostream>
 #include <optional>
 
 #include "Clocks.h"
 #include "GlbAnimation.h"
+#include "Interrupt.h"
 #include "Pictures.h"
 #include "Profile.h"
 #include "Progress.h"
@@ -16,8 +16,6 @@
 namespace jacket::demo {
 
 namespace {
-
-volatile std::sig_atomic_t interrupted = 0;
 
 struct Size {
     int width, height;
@@ -60,10 +58,10 @@ class Files {
             Progress progress(std::cerr, style, "pictures", m_pictures->count());
             m_pictures->write(m_directory->folder() / "frames", m_size.width, m_size.height, [&](int drawn) {
                 progress.update(drawn);
-                return interrupted == 0;
+                return !isInterrupted();
             });
         }
-        if (!interrupted) m_directory->commit();
+        if (!isInterrupted()) m_directory->commit();
     }
     const std::string& animationSummary() const { return m_animationSummary; }  ///< what it keeps
 
@@ -92,7 +90,7 @@ Profile simulate(World& world, Result& result, Files& files, Progress::Style sty
     const int frames = world.scene().frames();
     Progress progress(std::cerr, style, world.scene().name, frames, world.scene().dt);
     Profile profile;
-    for (int frame = 1; frame <= frames && !interrupted; ++frame) {
+    for (int frame = 1; frame <= frames && !isInterrupted(); ++frame) {
         const FrameReport report = world.step();
         const double start = wallSeconds();
         const FrameRecord record = measure(world, frame, report);
@@ -150,8 +148,7 @@ int runScene(const Scene& scene, const RunOutput& output, const AfterFrame& afte
     World world(scene, output.threads);
     Result result(world);
     Files files(output, world);
-    std::signal(SIGINT, [](int) { interrupted = 1; });
-    std::signal(SIGTERM, [](int) { interrupted = 1; });
+    catchInterrupts();
 
     const Progress::Style style = Progress::styleFor(output.quiet);
     const Profile profile = simulate(world, result, files, style, afterFrame);
@@ -159,10 +156,7 @@ int runScene(const Scene& scene, const RunOutput& output, const AfterFrame& afte
     Json summary = result.json(world);
     if (output.profile) summary["profile"] = profile.json();
     files.finish(summary, style);
-    if (interrupted) {
-        std::cerr << "jacket: interrupted" << (output.out.empty() ? "" : "; nothing was written") << '\n';
-        return kInterrupted;
-    }
+    if (isInterrupted()) return endInterrupted(!output.out.empty());
     const bool isSilent = !output.out.empty() && output.quiet;
     if (!isSilent) printSummary(std::cout, summary);
     if (!isSilent && output.profile) printProfile(std::cout, summary["profile"]);

@@ -14,13 +14,14 @@
 #include "ShellProxy.h"
 
 namespace jacket::bullet {
-namespace {
 
 /// A contact point and the piece of the shell it belongs to.
 struct FeaturePoint {
     int feature;
     btManifoldPoint point;
 };
+
+namespace {
 
 FeaturePoint toFeaturePoint(const BodyContact& impulse) {
     const Contact& contact = impulse.contact;

@@ -18,8 +18,6 @@ using Eigen::VectorXd;
 
 // In a direction that its joints forbid, a link takes part with this many times its mass.
 constexpr double kForbidden = 1e8;
-// Along a rigid contact or a joint's limit that bore load in the last solve, it is this many times heavier than it is.
-constexpr double kSupport = 1e4;
 // A motor that holds its joint is taken to give all its force when the joint is pushed this fast [m/s, rad/s].
 constexpr double kHeldSpeed = 1e-2;
 

@@ -17,6 +17,10 @@ namespace jacket::bullet {
 
 class RigidContacts;
 
+/// Along a rigid contact or a joint's limit that bore load in the last solve a body is this many times heavier than it
+/// is by itself.
+inline constexpr double kSupport = 1e4;
+
 /// The pieces of a collision shape, and what shows that the shape has changed under us. Concave pieces are only named:
 /// their triangles are read from the shape in every step.
 struct ShapePieces {

@@ -13,7 +13,6 @@
 namespace jacket::bullet {
 namespace {
 
-constexpr double kSupport = 1e4;         // so many times heavier than its body is what bears it
 constexpr std::size_t kMostJoined = 32;  // bodies of all piles: their masses are factored together
 
 bool isFree(const btCollisionObject& object) {
@@ -21,7 +20,7 @@ bool isFree(const btCollisionObject& object) {
     return body && body->getInvMass() > btScalar(0) && body->isActive() && !body->isStaticOrKinematicObject();
 }
 
-double massOf(const btRigidBody& body) {
+double linearMassOf(const btRigidBody& body) {
     return 1.0 / double(body.getInvMass());
 }
 
@@ -108,7 +107,7 @@ void RigidContacts::addSupports(const btRigidBody& body, double h, CoupledBody& 
         const bool first = manifold->getBody0() == &body;
         const auto* other = btRigidBody::upcast(otherObject);
         const double weight =  // a free body's is spread over its points
-            isFree(*otherObject) ? massOf(*other) / loadedPoints(*manifold) : kSupport * massOf(body);
+            isFree(*otherObject) ? linearMassOf(*other) / loadedPoints(*manifold) : kSupport * linearMassOf(body);
         for (int k = 0; k < manifold->getNumContacts(); ++k) {
             const btManifoldPoint& point = manifold->getContactPoint(k);
             if (!bears(point)) continue;
@@ -139,8 +138,8 @@ std::pmr::vector<RigidContact> RigidContacts::between(std::span<const Obstacle> 
             const auto other = indexOf.find(manifold->getBody1());
             if (manifold->getBody0() != obstacles[b].object || other == indexOf.end()) continue;
             const CoupledBody &first = obstacles[b].body, &second = obstacles[other->second].body;
-            const double weight = kSupport * std::max(massOf(*btRigidBody::upcast(manifold->getBody0())),
-                                                      massOf(*btRigidBody::upcast(manifold->getBody1())));
+            const double weight = kSupport * std::max(linearMassOf(*btRigidBody::upcast(manifold->getBody0())),
+                                                      linearMassOf(*btRigidBody::upcast(manifold->getBody1())));
             for (int k = 0; k < manifold->getNumContacts(); ++k) {
                 const btManifoldPoint& point = manifold->getContactPoint(k);
                 if (!bears(point) && point.getDistance() > btScalar(0)) continue;  // corners bear load by turns

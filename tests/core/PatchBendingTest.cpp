@@ -164,18 +164,18 @@ TEST_P(PatchBendingOn, ForcesDoNotPushOrTurnTheWhole) {
 }
 
 void expectDerivatives(Sheet& s, const Points& x, double tolerance) {
-    constexpr double kStep = 1e-6;
+    constexpr double kShift = 1e-6;
     const Points g = s.gradient(x);
     const Eigen::MatrixXd exact = s.hessian(x, HessianKind::Exact);
     EXPECT_LT((s.system.rhs + g).cwiseAbs().maxCoeff(), 1e-9 * g.cwiseAbs().maxCoeff());  // addTo's own gradient
     double worstGradient = 0.0, worstHessian = 0.0;
     for (int i = 0; i < x.size(); ++i) {
         Points up = x, down = x;
-        up.data()[i] += kStep;
-        down.data()[i] -= kStep;
+        up.data()[i] += kShift;
+        down.data()[i] -= kShift;
         worstGradient =
-            std::max(worstGradient, std::abs((s.energy.value(up) - s.energy.value(down)) / (2 * kStep) - g.data()[i]));
-        const Points column = (s.gradient(up) - s.gradient(down)) / (2 * kStep);
+            std::max(worstGradient, std::abs((s.energy.value(up) - s.energy.value(down)) / (2 * kShift) - g.data()[i]));
+        const Points column = (s.gradient(up) - s.gradient(down)) / (2 * kShift);
         worstHessian = std::max(worstHessian, (column.reshaped() - exact.col(i)).cwiseAbs().maxCoeff());
     }
     EXPECT_LT(worstGradient, tolerance * g.cwiseAbs().maxCoeff());

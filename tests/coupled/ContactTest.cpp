@@ -16,8 +16,6 @@ namespace {
 using jacket::testing::contactImpulse;
 using jacket::testing::Scene;
 
-constexpr double kStep = 1.0 / 60;
-
 TEST(Contact, ABallAtRestStaysWhereItIsAndWeighsWhatItWeighs) {
     RestingBall resting(12);
     const Vec3 start = resting.position();

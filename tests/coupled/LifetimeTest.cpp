@@ -15,8 +15,6 @@ using jacket::testing::contactImpulse;
 using jacket::testing::Scene;
 using jacket::testing::stateOf;
 
-constexpr double kStep = 1.0 / 60;
-
 TriangleMesh sheetAt(double side, int cells, double height) {
     TriangleMesh mesh = squareSheet(side, cells);
     mesh.positions.row(1).array() += height;

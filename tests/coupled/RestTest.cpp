@@ -13,7 +13,7 @@ namespace {
 TEST(Rest, ABallStaysForAHundredThousandSteps) {
     constexpr int kSteps = 100'000, kMean = 100;
     RestingBall resting(16, 0.5);
-    resting.scene.run(10.0, RestingBall::kStep);
+    resting.scene.run(10.0, kStep);
     const Vec3 start = resting.position();
     double moved = 0.0, sum = 0.0, worstMean = 0.0, worst = 0.0;
     int beyond = 0;

@@ -16,7 +16,7 @@ using jacket::testing::Scene;
 using jacket::testing::stateOf;
 using jacket::testing::totalMomentum;
 
-constexpr double kGravity = 9.81, kDrop = 0.3, kStep = 1.0 / 240;
+constexpr double kGravity = 9.81, kDrop = 0.3, kShortStep = 1.0 / 240;
 
 /// A stiff plate above a floor that gives back all.
 struct DroppedPlate : Scene<> {
@@ -55,7 +55,7 @@ TEST_P(FlatPlate, RisesByTheSquareOfItsRestitution) {
     EXPECT_LT(rebound, expected + (restitution == 0.0 ? 1e-6 : above + 0.005 * kDrop));
 }
 INSTANTIATE_TEST_SUITE_P(Steps, FlatPlate,
-                         ::testing::Combine(::testing::Values(0.0, 0.5, 1.0), ::testing::Values(1.0 / 60, kStep)));
+                         ::testing::Combine(::testing::Values(0.0, 0.5, 1.0), ::testing::Values(1.0 / 60, kShortStep)));
 
 /// One corner hits after the other. What a stiff plate that turns seems to hold in its membrane is the linear step's
 /// error, with and without contact, and gone in the next step.
@@ -67,7 +67,7 @@ TEST(Restitution, ATiltedPlateGainsNoEnergy) {
                 scene.floor.setFriction(0);
                 const double start = energy(scene).total();
                 for (int i = 0; i < 240; ++i) {
-                    scene.step(kStep);
+                    scene.step(kShortStep);
                     const auto now = energy(scene);
                     ASSERT_LT(now.total() - now.membrane, 1.001 * start)
                         << material.thickness << " " << restitution << " " << tilt << " step " << i;
@@ -91,10 +91,11 @@ TEST_P(BallOnPinnedSheet, Rebounds) {
         double before = 0.0;
         for (int i = 0; i < 120 && sheet.contacts().empty(); ++i) {
             before = double(ball.getLinearVelocity().y());
-            scene.step(kStep);
+            scene.step(kShortStep);
         }
-        scene.step(kStep);
-        EXPECT_NEAR(double(ball.getLinearVelocity().y()), -restitution * before, 0.03 * -before + 2 * kStep * kGravity)
+        scene.step(kShortStep);
+        EXPECT_NEAR(double(ball.getLinearVelocity().y()), -restitution * before,
+                    0.03 * -before + 2 * kShortStep * kGravity)
             << "restitution " << restitution;
     }
 }
@@ -115,7 +116,7 @@ TEST(Restitution, ABallAndAFreePlateExchangeMomentum) {
             ball.setRestitution(1);
             ball.setLinearVelocity(btVector3(0, -2, 0));
             const Vec3 before = totalMomentum(scene);
-            scene.run(0.08, kStep);
+            scene.run(0.08, kShortStep);
             EXPECT_LT((totalMomentum(scene) - before).norm(), bulletTolerance(1e-9, 1e-6) * before.norm());
             const double parting = double(ball.getLinearVelocity().y()) -
                                    double(plate.linearMomentum().y()) / plate.shell().masses().sum();
@@ -142,7 +143,7 @@ TEST(Restitution, AFreeClothKeepsItsMomentum) {
 /// Restitution is for what closes faster than Bullet's threshold.
 TEST(Restitution, WhatLiesStillComesToRest) {
     for (const ShellMaterial& material : {materials::steel(1e-3), trampolineCloth()})
-        for (const double h : {1.0 / 60, kStep}) {
+        for (const double h : {1.0 / 60, kShortStep}) {
             DroppedPlate scene(1.0, 0.0, material, 1.5e-3);
             for (int i = 0; i < int(4.0 / h) && !scene.plate->isAsleep(); ++i) {
                 scene.step(h);
@@ -155,7 +156,7 @@ TEST(Restitution, WhatLiesStillComesToRest) {
 TEST(Restitution, TheWorldsThresholdCounts) {
     DroppedPlate scene(1.0);
     scene.world.getSolverInfo().m_restitutionVelocityThreshold = 10;
-    EXPECT_LT(scene.rebound(kStep), 1e-3);
+    EXPECT_LT(scene.rebound(kShortStep), 1e-3);
 }
 
 /// It takes both: the product decides.
@@ -163,7 +164,7 @@ TEST(Restitution, ABodyWithoutItChangesNothing) {
     const auto run = [](double shell, double floor) {
         DroppedPlate scene(shell, 0.3);
         scene.floor.setRestitution(btScalar(floor));
-        scene.run(0.5, kStep);
+        scene.run(0.5, kShortStep);
         return stateOf(scene);
     };
     const auto without = run(0.0, 0.0);

@@ -13,8 +13,6 @@ namespace {
 
 using jacket::testing::Scene;
 
-constexpr double kStep = 1.0 / 60;
-
 TriangleMesh sheetAt(double side, int cells, double height) {
     TriangleMesh mesh = squareSheet(side, cells);
     mesh.positions.row(1).array() += height;

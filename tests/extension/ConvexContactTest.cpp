@@ -19,15 +19,16 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <random>
 
 #include "ClosedForms.h"
 #include "ConvexPieces.h"
+#include "support/Random.h"
 
 namespace jacket::bullet {
 namespace {
 
 constexpr bool kFloat = sizeof(btScalar) == sizeof(float);
+using testing::Random;
 using Pieces = std::vector<std::unique_ptr<ConvexPiece>>;
 
 Mat3 triangleOf(const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -35,27 +36,6 @@ Mat3 triangleOf(const Vec3& a, const Vec3& b, const Vec3& c) {
     triangle << a, b, c;
     return triangle;
 }
-
-class Random {
-  public:
-    explicit Random(unsigned seed) : m_engine(seed) {}
-    double between(double low, double high) { return std::uniform_real_distribution<double>(low, high)(m_engine); }
-    double scale() { return std::pow(10.0, between(-3, 3)); }  // 1 mm .. 1 km
-    Vec3 inCube(double half) { return {between(-half, half), between(-half, half), between(-half, half)}; }
-    Vec3 direction() {
-        std::normal_distribution<double> normal;
-        return Vec3(normal(m_engine), normal(m_engine), normal(m_engine)).normalized();
-    }
-    Frame frame(double offset) {
-        Frame frame = Frame::Identity();
-        frame.linear() = Eigen::AngleAxisd(between(0, 3), direction()).toRotationMatrix();
-        frame.translation() = inCube(offset);
-        return frame;
-    }
-
-  private:
-    std::mt19937 m_engine;
-};
 
 using Support = std::function<Vec3(const Vec3&)>;
 

@@ -15,7 +15,7 @@
 namespace jacket::bullet::testing {
 namespace {
 
-constexpr double kStep = 1.0 / 120;
+constexpr double kShortStep = 1.0 / 120;
 
 double flat(double, double) {
     return 0.0;
@@ -36,8 +36,8 @@ void expectWeightIsBorne(BulletScene& scene, ShellBody& sheet, double tolerance)
     Vec3 mean = Vec3::Zero();
     const int steps = 40;
     for (int i = 0; i < steps; ++i) {
-        scene.step(kStep);
-        mean += contactForce(sheet, kStep) / steps;
+        scene.step(kShortStep);
+        mean += contactForce(sheet, kShortStep) / steps;
     }
     EXPECT_LT((mean - Vec3(0, weightOf(sheet), 0)).norm(), tolerance * weightOf(sheet)) << mean.transpose();
 }
@@ -107,7 +107,7 @@ TEST_P(Floors, BearTheWeightOfASheet) {
     scene.addBody(std::move(floor.shape), 0, btVector3(0, 0, 0));
     auto& sheet = scene.shells->add(squareSheet(1, 8), trampolineCloth());
     place(sheet, {0.013, 0.01, 0.017});
-    scene.run(0.5, kStep);
+    scene.run(0.5, kShortStep);
     const double lowest = lowestClearance(sheet, flat), thickness = sheet.contactThickness();
     EXPECT_NEAR(lowest, thickness, bulletTolerance(6e-5, 7e-5));
     expectWeightIsBorne(scene, sheet, 1e-3);
@@ -137,7 +137,7 @@ TEST(TriangleMesh, AFlatFloorSlidesLikeAPlane) {
             auto& sheet = scene.shells->add(squareSheet(0.5, 8), trampolineCloth(), {.friction = friction});
             place(sheet, {-0.7, sheet.contactThickness(), 0.1});
             sheet.setVelocity(btVector3(1, 0, btScalar(0.2)));
-            scene.run(0.25, kStep);
+            scene.run(0.25, kShortStep);
             speed[k] = double(sheet.linearMomentum().length()) / sheet.shell().masses().sum();
             scene.shells.reset();
             for (const auto& body : scene.bodies) scene.world.removeRigidBody(body.get());
@@ -157,7 +157,7 @@ TEST(TriangleMesh, IsOneSided) {
     auto& sunk = scene.shells->add(squareSheet(0.5, 5), trampolineCloth());
     place(below, {-1, -0.3, 0});
     place(sunk, {1, -0.01, 0});
-    scene.run(0.4, kStep);
+    scene.run(0.4, kShortStep);
     EXPECT_NEAR(below.positions()[12].y(), -0.3 - 0.5 * 9.81 * 0.16, 0.05);
     EXPECT_GT(lowestClearance(sunk, flat), -1e-4);
 }
@@ -184,14 +184,14 @@ TEST(EditedHeightfield, LiftsWhatLiesOnIt) {
     scene.addBody(std::move(shape), 0, btVector3(0, 0, 0));
     auto& sheet = scene.shells->add(squareSheet(0.5, 5), trampolineCloth());
     place(sheet, {0, 0.001, 0});
-    scene.run(0.2, kStep);
+    scene.run(0.2, kShortStep);
     for (int i = 0; i < 60; ++i) {
         for (float& height : heights) height += 1e-3f;
-        scene.step(kStep);
+        scene.step(kShortStep);
     }
     // The body stands still: of 1 mm more in every step a fifth is taken back in each, which leaves 4 mm at most.
     EXPECT_GT(lowestClearance(sheet, [](double, double) { return 0.06; }), -0.005);
-    scene.run(0.5, kStep);
+    scene.run(0.5, kShortStep);
     EXPECT_NEAR(lowestClearance(sheet, flat), 0.06 + sheet.contactThickness(), 1e-4);
 }
 
@@ -227,7 +227,7 @@ TEST(TriangleMesh, ASpikeHoldsATriangleThatIsLarger) {
     place(sheet, {0.03, 0.0505, -0.04});
     pinBorder(sheet);
     for (const int corner : {0, 3, 12, 15}) sheet.unpin(corner);
-    scene.run(1.0, kStep);
+    scene.run(1.0, kShortStep);
     // Somewhere in the triangle above the tip is a point at the tip's height.
     const auto& x = sheet.shell().positions();
     double above = -1;
@@ -241,7 +241,7 @@ TEST(TriangleMesh, ASpikeHoldsATriangleThatIsLarger) {
     }
     EXPECT_NEAR(above, 0.05 + sheet.contactThickness(), 1e-3);
     ASSERT_GE(sheet.contacts().size(), 1u);
-    EXPECT_GT(contactForce(sheet, kStep).y(), 0);
+    EXPECT_GT(contactForce(sheet, kShortStep).y(), 0);
 }
 
 /// A roof's ridge along x, under a coarse sheet whose vertices are all beside it.
@@ -254,7 +254,7 @@ TEST(TriangleMesh, ARidgeHoldsTheEdgesThatCrossIt) {
     place(sheet, {0.0, 0.11, 0.03});
     double lowest = 1e9;
     for (int i = 0; i < 60; ++i) {
-        scene.step(kStep);
+        scene.step(kShortStep);
         for (const auto& e : sheet.shell().mesh().edges()) {
             const Vec3 p = 0.5 * (sheet.shell().positions().col(e.v0) + sheet.shell().positions().col(e.v1));
             lowest = std::min(lowest, p.y() - roof(p.x(), p.z()));
@@ -279,7 +279,7 @@ TEST(Compound, OfBoxesBearsASheet) {
     scene.addBody(std::move(shape), 0, btVector3(0, 0, 0));
     auto& sheet = scene.shells->add(squareSheet(1, 9), trampolineCloth());
     place(sheet, {0.013, 0.01, 0.017});
-    scene.run(0.5, kStep);
+    scene.run(0.5, kShortStep);
     EXPECT_NEAR(lowestClearance(sheet, flat), sheet.contactThickness(), 1e-4);
     expectWeightIsBorne(scene, sheet, 1e-3);
 }
@@ -298,15 +298,15 @@ TEST(Compound, ChildrenComeAndGoWhileTheyTouch) {
     at.setOrigin(btVector3(0, 0, 0));
     compound.addChildShape(at, &block);
     scene.world.updateSingleAabb(&body);
-    scene.run(0.4, kStep);
+    scene.run(0.4, kShortStep);
     EXPECT_GT(sheet.positions()[24].y(), 0.149);  // on the block
     compound.removeChildShape(&block);
-    scene.run(0.6, kStep);
+    scene.run(0.6, kShortStep);
     EXPECT_LT(sheet.positions()[24].y(), 0.02);
     EXPECT_GT(lowestClearance(sheet, flat), -1e-4);
     const btScalar half(0.5);
     box.setLocalScaling(btVector3(1, half, 1));  // its top is now 5 cm lower
-    scene.run(0.6, kStep);
+    scene.run(0.6, kShortStep);
     EXPECT_NEAR(lowestClearance(sheet, flat), -0.05 + sheet.contactThickness(), 1e-3);
 }
 
@@ -320,7 +320,7 @@ TEST(Compound, AnEmptyShapeIsNothing) {
     scene.addBody(std::move(shape), 0, btVector3(0, btScalar(-0.1), 0));
     auto& sheet = scene.shells->add(squareSheet(0.5, 4), trampolineCloth());
     place(sheet, {0, 0.01, 0});
-    scene.run(0.3, kStep);
+    scene.run(0.3, kShortStep);
     EXPECT_GT(lowestClearance(sheet, flat), -1e-4);
     EXPECT_TRUE(scene.shells->takeWarnings().empty());
 }
@@ -358,7 +358,7 @@ TEST(OtherConvexShapes, HangInASheetLikeABall) {
         auto& ball = scene.addBody(std::move(shape), 1.0, btVector3(0, btScalar(0.2), 0));
         auto& sheet = scene.shells->add(squareSheet(1, 10), trampolineCloth());
         pinBorder(sheet);
-        scene.run(0.5, kStep);
+        scene.run(0.5, kShortStep);
         heights.push_back(double(ball.getWorldTransform().getOrigin().y()));
         EXPECT_LT(penetration(sheet, toVec3(ball.getWorldTransform().getOrigin()), 0.2), bulletTolerance(2e-3, 8e-3));
     }
@@ -386,7 +386,7 @@ TEST(GImpact, AMovingBodyIsCaughtByASheet) {
     auto& sheet = scene.shells->add(squareSheet(1, 12), trampolineCloth());
     pinBorder(sheet);
     for (int i = 0; i < 240; ++i) {
-        scene.step(kStep);
+        scene.step(kShortStep);
         ASSERT_GT(body.getWorldTransform().getOrigin().y(), -0.2) << "step " << i;
         ASSERT_TRUE(scene.shells->lastStep().finite);
     }

@@ -9,25 +9,16 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
 
 #include "ClosedForms.h"
+#include "support/Random.h"
 
 namespace jacket::bullet {
 namespace {
 
+using testing::Random;
+
 constexpr double kAccuracy = sizeof(btScalar) == sizeof(float) ? 1e-6 : 1e-12;
-
-class Random {
-  public:
-    explicit Random(unsigned seed) : m_engine(seed) {}
-    double between(double low, double high) { return std::uniform_real_distribution<double>(low, high)(m_engine); }
-    double scale() { return std::pow(10.0, between(-3, 3)); }  // 1 mm .. 1 km
-    Vec3 inCube(double half) { return {between(-half, half), between(-half, half), between(-half, half)}; }
-
-  private:
-    std::mt19937 m_engine;
-};
 
 /// A soup of triangles as Bullet rounds them, and the shape made of it.
 struct Soup {

@@ -7,6 +7,8 @@ using BulletScene = jacket::testing::Scene<>;
 using jacket::testing::penetration;
 using jacket::testing::toVec3;
 
+constexpr double kStep = 1.0 / 60;  ///< [s] what most tests step by
+
 /// Cloth of 0.3 kg/m^2, E t = 1e4 N/m, nu = 0.3, D = 1e-4 N m.
 inline ShellMaterial trampolineCloth() {
     ShellMaterial m{.young = 3.03e7, .poisson = 0.3, .thickness = 3.3e-4, .density = 909.0};

@@ -150,7 +150,7 @@ struct StackScene : BulletScene {
 /// A ball of 2 kg in a sheet that is pinned at its border. Without `angularDamping` (see btRigidBody::setDamping)
 /// nothing but the sheet takes the energy with which it rolls to and fro.
 struct RestingBall {
-    static constexpr double kStep = 1.0 / 60, kWeight = 2.0 * 9.81;
+    static constexpr double kWeight = 2.0 * 9.81;
 
     BulletScene scene;
     btRigidBody& ball;

@@ -39,7 +39,7 @@ void requirePositive(double value, const char* field) {
 }
 
 /// Collects triangles column by column.
-class TriangleList {
+class TriangleCollector {
   public:
     void add(int a, int b, int c) { m_indices.insert(m_indices.end(), {a, b, c}); }
     Indices<3> take() const {
@@ -57,7 +57,7 @@ Points gather(const std::vector<Vec3>& points) {
 }
 
 /// The cell a-b-c-d (counter-clockwise from its lower left corner), cut along a-c or along b-d.
-void addCell(TriangleList& triangles, int a, int b, int c, int d, bool cutAlongAc) {
+void addCell(TriangleCollector& triangles, int a, int b, int c, int d, bool cutAlongAc) {
     if (cutAlongAc) {
         triangles.add(a, b, c);
         triangles.add(a, c, d);
@@ -70,7 +70,7 @@ void addCell(TriangleList& triangles, int a, int b, int c, int d, bool cutAlongA
 /// Fills the strip between two rows of vertices, always with the shorter of the two possible edges. The upper row lies
 /// to the left of the lower one, so that triangles are counter-clockwise. A closed row repeats its first vertex at the
 /// end.
-void stitch(TriangleList& triangles, const std::vector<Vec3>& x, const std::vector<int>& lower,
+void stitch(TriangleCollector& triangles, const std::vector<Vec3>& x, const std::vector<int>& lower,
             const std::vector<int>& upper) {
     std::size_t i = 0, j = 0;
     while (i + 1 < lower.size() || j + 1 < upper.size()) {
@@ -134,7 +134,7 @@ TriangleMesh makeGrid(const GridOptions& options) {
     }
     rowStart.push_back(static_cast<int>(points.size()));
 
-    TriangleList triangles;
+    TriangleCollector triangles;
     for (int j = 0; j < ny; ++j) {
         const int low = rowStart[j], high = rowStart[j + 1];
         if (!equilateral) {
@@ -164,7 +164,7 @@ TriangleMesh makeHemisphere(double radius, int rings) {
     require(rings >= 1 && rings <= 10000, "makeHemisphere: rings", "1..10000", rings);
     std::vector<Vec3> points{{0.0, radius, 0.0}};
     std::vector<int> inner{0};
-    TriangleList triangles;
+    TriangleCollector triangles;
     for (int k = 1; k <= rings; ++k) {
         const double share = static_cast<double>(k) / rings, angle = 0.5 * kPi * share;  // from the pole
         // Edges along the ring as long as those between rings (4 rings sin(angle)), up to a tenth shorter at the rim.
@@ -190,7 +190,7 @@ TriangleMesh makeCylinder(double radius, double height, int around, int along) {
     require(around >= 3, "makeCylinder: around", ">= 3", around);
     require(along >= 1, "makeCylinder: along", ">= 1", along);
     std::vector<Vec3> points;
-    TriangleList triangles;
+    TriangleCollector triangles;
     for (int j = 0; j <= along; ++j)
         for (int i = 0; i < around; ++i) {
             const double turn = 2.0 * kPi * i / around, y = height * (static_cast<double>(j) / along - 0.5);

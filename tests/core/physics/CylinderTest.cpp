@@ -14,7 +14,6 @@
 namespace jacket {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kRadius = 1.0;     // [m]
 constexpr double kStiffness = 0.3;  // D [N m]
 constexpr int kCells = 24;
@@ -74,7 +73,7 @@ double energyRatio(GridDiagonals diagonals, double direction, bool curvedRest = 
 /// Calls check(direction) every 7.5 degrees.
 template <class Check>
 void forDirections(const Check& check) {
-    for (int i = 0; i < 24; ++i) check(i * kPi / 24);
+    for (int i = 0; i < 24; ++i) check(i * std::numbers::pi / 24);
 }
 
 template <class Model>
@@ -92,7 +91,7 @@ TYPED_TEST(CylinderTest, EquilateralMeshesStoreThePlatesEnergyInEveryDirection) 
 
 TYPED_TEST(CylinderTest, GridsStoreThePlatesEnergyAlongTheirAxes) {
     for (const auto diagonals : {GridDiagonals::Right, GridDiagonals::Alternating})
-        for (const double direction : {0.0, kPi / 2})
+        for (const double direction : {0.0, std::numbers::pi / 2})
             EXPECT_NEAR(energyRatio<TypeParam>(diagonals, direction), 1.0, kTolerance);
 }
 

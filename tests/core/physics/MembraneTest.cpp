@@ -13,8 +13,6 @@
 namespace jacket {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 ShellMaterial sheetMaterial() {
     ShellMaterial material;
     material.young = 1e6;
@@ -117,7 +115,7 @@ TEST(StVenantKirchhoffSheetTest, FreeSidesStoreLeast) {  // so that the contract
 TEST(StVenantKirchhoffSheetTest, PureShearHasTheShearModulus) {
     const double shearStiffness = kStretch / (2.0 * 1.3);  // G t
     for (const double e : {0.01, 0.2})                     // strains e and -e at right angles: a shear of 2 e
-        for (const double direction : {0.0, kPi / 4, 1.0})
+        for (const double direction : {0.0, std::numbers::pi / 4, 1.0})
             EXPECT_NEAR(density(StVenantKirchhoffMembrane{}, stretched(factorOf(e), factorOf(-e), direction)),
                         0.5 * shearStiffness * 4.0 * e * e, 1e-9 * kStretch);
 }
@@ -242,7 +240,7 @@ TEST(SpringSheetTest, EquilateralNetHasYoungsModulusInEveryDirection) {  // and 
     const double e = 1e-5;
     const SpringMembrane springs{.compression = true};
     for (int i = 0; i < 12; ++i) {
-        const double direction = i * kPi / 12;
+        const double direction = i * std::numbers::pi / 12;
         const Mat2 pulled = stretched(1.0 + e, 1.0 - e / 3.0, direction);
         EXPECT_NEAR(density(springs, pulled, GridDiagonals::Equilateral) / (0.5 * kStretch * e * e), 1.0, 1e-4);
         EXPECT_LT(density(springs, pulled, GridDiagonals::Equilateral),

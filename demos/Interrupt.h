@@ -1,0 +1,11 @@
+#pragma once
+
+namespace jacket::demo {
+
+/// From now on SIGINT and SIGTERM let a job end by itself: it asks isInterrupted().
+void catchInterrupts();
+bool isInterrupted();
+/// Says so on stderr. Returns the program's exit code.
+int endInterrupted(bool hasFolder);  ///< whether the job was to write files: none is left
+
+}  // namespace jacket::demo
