@@ -651,7 +651,8 @@ PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, 
     const double tolerance = linearTolerance(input);
     system.start(start, freeTwist, u);  // dv = 0
     const double floor = floorOfReference(input, preconditioner.isCoarse(system) ? 1.0 : 0.1);
-    const double norm2 = std::max(pcg.begin(system, preconditioner, u), floor);  // the tolerance refers to it
+    const double atStart = pcg.begin(system, preconditioner, u, CoupledSystem::Kept::Start);
+    const double norm2 = std::max(atStart, floor);  // the tolerance refers to it
     system.start(guess, guessTwist, u);
     const double rho = pcg.begin(system, preconditioner, u);
     double target2 = tolerance * tolerance * norm2;

@@ -76,4 +76,16 @@ void BlockProduct::multiply(const BlockMatrix& matrix, const double* x, double* 
     runRanges(team, matrix.size(), kRowsAtATime, [&](int begin, int end) { multiplyKernel(blocks, begin, end, x, y); });
 }
 
+void BlockProduct::addColumn(const BlockMatrix& matrix, int vertex, const Vec3& change, double* y) const {
+    const auto add = [&](int row, const Vec3& by) { Eigen::Map<Vec3>(y + 3 * row) += by; };
+    add(vertex, matrix.diagonal()[vertex] * change);
+    for (int k = m_lowerStart[vertex]; k < m_lowerStart[vertex + 1]; ++k)
+        add(m_lowerColumn[k], matrix.lower()[k].transpose() * change);
+    for (int k = m_upperStart[vertex]; k < m_upperStart[vertex + 1]; ++k)
+        add(m_upperRow[k], matrix.lower()[m_upperSlot[k]] * change);
+    if (!matrix.beside()) return;
+    for (ConstantHessian::InnerIterator it(*matrix.beside(), vertex); it; ++it)  // symmetric: a row is a column
+        add(static_cast<int>(it.col()), matrix.besideFactor() * it.value() * change);
+}
+
 }  // namespace jacket

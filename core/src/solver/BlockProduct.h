@@ -14,6 +14,8 @@ class BlockProduct {
     explicit BlockProduct(const BlockMatrix& matrix);
     /// y = A x of a matrix with that pattern, three doubles a vertex. They must not overlap.
     void multiply(const BlockMatrix& matrix, const double* x, double* y, WorkerTeam* team) const;
+    /// y += A e, e being `change` at one vertex and 0 at all others.
+    void addColumn(const BlockMatrix& matrix, int vertex, const Vec3& change, double* y) const;
 
   private:
     std::vector<int> m_lowerStart, m_lowerColumn;            ///< blocks of each row

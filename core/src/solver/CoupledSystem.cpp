@@ -48,6 +48,7 @@ void CoupledSystem::begin(const std::vector<ShellPart>& shells, int vertexCount,
     m_rows.clear();
     m_precision = precision;
     m_team = team;
+    for (Product& product : m_products) product.isValid = false;
     m_compactPlaces.resize(vertexCount);
     for (const auto& shell : m_shells) {
         if (precision == Precision::Double && !shell.isCompact) continue;
@@ -96,6 +97,29 @@ void CoupledSystem::multiply(const Points& v, Points& q) const {
         else
             shell.matrix->multiply(from, to);
     }
+}
+
+/// A v, which `last` keeps. Where few vertices move otherwise than they did there, only their part is computed anew.
+const Points& CoupledSystem::multiplyFrom(Product& last, const Points& v) const {
+    constexpr int kFew = 8;  // of so many vertices one: a column takes longer than a row
+    m_moved.clear();
+    last.isValid = last.isValid && m_precision == Precision::Single;
+    for (int i = 0; last.isValid && i < m_vertexCount; ++i)
+        if (v.col(i) != last.v.col(i)) m_moved.push_back(i);
+    if (!last.isValid || kFew * static_cast<int>(m_moved.size()) > m_vertexCount) {
+        last.q.resize(3, m_vertexCount);
+        multiply(v, last.q);
+    } else {
+        auto shell = m_shells.begin();
+        for (const int i : m_moved) {
+            while (i >= shell->offset + shell->matrix->size()) ++shell;
+            shell->matrix->compact().product.addColumn(*shell->matrix, i - shell->offset, v.col(i) - last.v.col(i),
+                                                       last.q.data() + 3 * shell->offset);
+        }
+    }
+    last.v = v;
+    last.isValid = true;
+    return last.q;
 }
 
 Vec3 CoupledSystem::rowVelocity(const SoftRow& row, const Points& v,
@@ -199,13 +223,13 @@ void CoupledSystem::round(const CoupledVector& u, CompactVector& result) const {
     result.w = u.w;
 }
 
-void CoupledSystem::residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered) const {
+void CoupledSystem::residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered, Kept kept) const {
     velocities(u, m_v);
-    multiply(m_v, m_q);
+    const Points& q = multiplyFrom(m_products[static_cast<std::size_t>(kept)], m_v);
     unfiltered.resize(3, m_vertexCount);
     for (const auto& shell : m_shells)
         unfiltered.middleCols(shell.offset, shell.rhs->cols()) =
-            *shell.rhs - m_q.middleCols(shell.offset, shell.rhs->cols());
+            *shell.rhs - q.middleCols(shell.offset, shell.rhs->cols());
     m_w.resize(6, bodyCount());
     for (int b = 0; b < bodyCount(); ++b) m_w.col(b) = m_freeTwist[b] - u.w.col(b);
     momentum(m_w, r.w);

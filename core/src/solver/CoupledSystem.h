@@ -131,9 +131,12 @@ class CoupledSystem {
     void filter(CompactVector& u) const;
     /// u rounded.
     void round(const CoupledVector& u, CompactVector& result) const;
+    /// Which of the products that are kept a residual is to start from: those of the step's start and of the present
+    /// solution differ from solve to solve only where contacts do.
+    enum class Kept { Start, Solution };
     /// r = filtered right side minus operator at u. `unfiltered` receives (b - A v) of every vertex: minus the
     /// reactions.
-    void residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered) const;
+    void residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered, Kept kept = Kept::Solution) const;
     /// Zero in the constrained directions.
     void filter(CoupledVector& u) const;
     /// What a soft row does: its impulse on the shell at absolute velocities v.
@@ -142,7 +145,12 @@ class CoupledSystem {
     Vec3 rowVelocity(const SoftRow& row, const Points& v, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) const;
 
   private:
+    struct Product {
+        Points v, q;  ///< A v of all shells
+        bool isValid = false;
+    };
     void multiply(const Points& v, Points& q) const;
+    const Points& multiplyFrom(Product& last, const Points& v) const;
     std::vector<ShellPart> m_shells;
     int m_vertexCount = 0;
     std::vector<Mat6> m_mass;
@@ -155,6 +163,8 @@ class CoupledSystem {
     WorkerTeam* m_team = nullptr;
     std::vector<int> m_compactPlaces;
     mutable std::vector<Eigen::Vector3f> m_saved;
+    mutable std::array<Product, 2> m_products;  ///< of the present matrices, by Kept
+    mutable std::vector<int> m_moved;           ///< vertices: see multiplyFrom
     mutable Points m_v, m_q;
     mutable Eigen::Matrix<double, 6, Eigen::Dynamic> m_w;
 };

@@ -73,9 +73,9 @@ double FilteredPcg::precondition(const CoupledSystem& system, const CoupledPreco
 }
 
 double FilteredPcg::begin(const CoupledSystem& system, const CoupledPreconditioner& preconditioner,
-                          const CoupledVector& u) {
+                          const CoupledVector& u, CoupledSystem::Kept kept) {
     resize(system);
-    system.residual(u, m_r, m_unfiltered);
+    system.residual(u, m_r, m_unfiltered, kept);
     return precondition(system, preconditioner);
 }
 

@@ -17,7 +17,8 @@ class FilteredPcg {
     static constexpr double kLeastSingleTolerance = 1e-5;
 
     /// Starts at u, which must satisfy (I - S) s = z as every u does here; returns r^T P^-1 r there.
-    double begin(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, const CoupledVector& u);
+    double begin(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, const CoupledVector& u,
+                 CoupledSystem::Kept kept = CoupledSystem::Kept::Solution);
     /// After begin: improves u until r^T P^-1 r <= tolerance^2 reference. Of a system in single precision the
     /// iterations are; the residual that they end with is measured in double, and where it is not small enough they
     /// start again from it. Where they have made it much worse, u is left as it was.
