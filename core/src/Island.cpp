@@ -685,7 +685,8 @@ void IslandSolver::Impl::solveRound(const IslandInput& input, bool roughly, int&
         guessTwist = u.w;
     }
     LapTimer lap(input);
-    preconditioner.build(system, input.shells[0]->settings().preconditioner);
+    const bool keepsCoarse = freshIterations >= 0 && system.precision() == Precision::Single;
+    preconditioner.build(system, input.shells[0]->settings().preconditioner, keepsCoarse);
     lap.addTo(times.factor);
     freshIterations = solveOnce(input, roughly, maxIterations, report).iterations;
     lap.addTo(times.solve);

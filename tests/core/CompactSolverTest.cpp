@@ -461,6 +461,41 @@ TEST(CompactSolveTest, ResidualsAreDoubleWhereFewVerticesMove) {
     }
 }
 
+/// Contacts come in a step: few, which the coarse space need not know, or so many that it is made anew.
+TEST(CompactSolveTest, ACoarseSpaceIsKeptAsLongAsItServes) {
+    const SheetMatrix m(61);
+    for (const int apart : {97, 9}) {
+        CoupledSystem system;
+        system.begin({{.matrix = &m.step.matrix, .rhs = &m.step.rhs, .offset = 0, .positions = &m.sheet.positions()}},
+                     m.size(), {}, {}, {}, Precision::Single);
+        std::vector<VertexConstraint> pins, contacts;
+        for (int i = 0; i < m.size(); ++i) {
+            if (m.sheet.isPinned(i))
+                pins.push_back({.vertex = i});
+            else if (i % apart == 0)
+                contacts.push_back({.vertex = i, .free = Vec3(1, 0, 1).asDiagonal()});
+        }
+        contacts.insert(contacts.end(), pins.begin(), pins.end());
+        CoupledPreconditioner preconditioner;
+        system.setContacts(pins, {});
+        preconditioner.build(system, Preconditioner::IncompleteCholesky);
+        system.setContacts(contacts, {});
+        std::array<CoupledVector, 2> solved;
+        std::array<int, 2> iterations{};
+        for (const bool keepsCoarse : {true, false}) {
+            preconditioner.build(system, Preconditioner::IncompleteCholesky, keepsCoarse);
+            FilteredPcg pcg;
+            CoupledVector& u = solved[keepsCoarse];
+            system.start(m.sheet.velocities(), Eigen::Matrix<double, 6, Eigen::Dynamic>(6, 0), u);
+            const double reference = pcg.begin(system, preconditioner, u);
+            iterations[keepsCoarse] = pcg.solve(system, preconditioner, reference, 1e-2, 3000, u).iterations;
+            EXPECT_TRUE(pcg.solve(system, preconditioner, reference, 1e-5, 3000, u).converged);
+        }
+        EXPECT_LT((solved[true].s - solved[false].s).norm(), 1e-3 * solved[false].s.norm());
+        EXPECT_LE(iterations[true], iterations[false] + 6) << apart << " apart";  // what building it costs
+    }
+}
+
 TEST(CompactSolveTest, SaysWhenItsBudgetIsSpent) {
     const SheetMatrix m(21);
     CoupledSystem system;

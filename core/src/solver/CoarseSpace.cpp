@@ -366,9 +366,11 @@ void CoarseSpace::build(const CompactMatrix& matrix, const Points& positions, co
     placeArms(matrix, positions);
     m_isHeld.assign(matrix.size(), 0);
     m_isNearHeld.assign(matrix.size(), 0);
+    m_heldCount = 0;
     for (int row = 0; row < matrix.size(); ++row) {
         if (!free[row]) continue;
         m_isHeld[row] = m_isNearHeld[row] = 1;
+        ++m_heldCount;
         for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) m_isNearHeld[matrix.column(k)] = 1;
     }
     m_sums.assign(kSums * m_factor.blockCount(), 0.0);

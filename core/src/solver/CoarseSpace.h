@@ -32,6 +32,7 @@ class CoarseSpace {
     void solve() const { m_factor.solve(m_coarse.data()); }
     void prolongTo(float* z, WorkerTeam* team) const;
     int patchCount() const { return m_factor.size(); }
+    int heldCount() const { return m_heldCount; }                  ///< constrained rows when it was built
     const std::vector<int>& patchOf() const { return m_patchOf; }  ///< of each row
 
   private:
@@ -46,6 +47,7 @@ class CoarseSpace {
     /// Of each row three groups of places of scalars: in the patch and below the diagonal; beyond it, each with the
     /// factor's block; those whose mirror images are such.
     std::vector<int> m_scalarStart, m_scalars;
+    int m_heldCount = 0;
     std::vector<char> m_isHeld;        ///< rows with a projector
     std::vector<char> m_isNearHeld;    ///< and those beside them
     std::vector<float> m_arms;         ///< of each row from its patch' centre over the patch' size, and 1

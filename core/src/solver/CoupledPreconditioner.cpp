@@ -2,21 +2,23 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cstdlib>
 #include <numeric>
 
 #include "solver/CompactShell.h"
 
 namespace jacket {
-void CoupledPreconditioner::build(const CoupledSystem& system, Preconditioner kind) {
+void CoupledPreconditioner::build(const CoupledSystem& system, Preconditioner kind, bool keepsCoarse) {
     m_kind = system.precision() == Precision::Single ? Preconditioner::IncompleteCholesky : kind;
     m_factors.resize(system.shells().size());
     m_inverseBlocks.resize(system.shells().size());
     m_complete.resize(system.shells().size());
-    for (std::size_t i = 0; i < system.shells().size(); ++i) buildShell(system, i, m_kind);
+    for (std::size_t i = 0; i < system.shells().size(); ++i) buildShell(system, i, m_kind, keepsCoarse);
     updateBodies(system);
 }
 
-void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind) {
+void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind,
+                                       bool keepsCoarse) {
     const auto& part = system.shells()[shell];
     m_diagonal = part.matrix->diagonal();
     if (kind == Preconditioner::IncompleteCholesky)
@@ -27,8 +29,9 @@ void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t 
     filterBlocks(system, part);
     if (system.precision() == Precision::Double && factorCompletely(system, shell)) return;
     if (isCompact(system, shell)) {
-        part.matrix->compact().factor.factor(m_diagonal, m_lower, system.team());
-        buildCoarse(system, part);
+        CompactShell& compact = part.matrix->compact();
+        compact.factor.factor(m_diagonal, m_lower, system.team());
+        if (!keepsCoarse || !compact.coarse || !knowsContacts(system, part, *compact.coarse)) buildCoarse(system, part);
         return;
     }
     if (kind == Preconditioner::IncompleteCholesky) {
@@ -61,6 +64,15 @@ void CoupledPreconditioner::findFree(const CoupledSystem& system, const CoupledS
     for (const auto& c : system.constraints())
         if (c.vertex >= part.offset && c.vertex < part.offset + part.matrix->size())
             m_free[c.vertex - part.offset] = &c.free;
+}
+
+/// Whether about as many vertices are constrained as when it was built: no more have come or gone than it has patches.
+bool CoupledPreconditioner::knowsContacts(const CoupledSystem& system, const CoupledSystem::ShellPart& part,
+                                          const CoarseSpace& coarse) {
+    const auto held = std::count_if(system.constraints().begin(), system.constraints().end(), [&](const auto& c) {
+        return c.vertex >= part.offset && c.vertex < part.offset + part.matrix->size();
+    });
+    return std::abs(static_cast<int>(held) - coarse.heldCount()) <= coarse.patchCount();
 }
 
 void CoupledPreconditioner::buildCoarse(const CoupledSystem& system, const CoupledSystem::ShellPart& part) {

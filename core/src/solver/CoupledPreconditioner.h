@@ -17,7 +17,9 @@ namespace jacket {
 /// other shells.
 class CoupledPreconditioner {
   public:
-    void build(const CoupledSystem& system, Preconditioner kind);
+    /// `keepsCoarse`: coarse spaces may stay as they are, as contacts alone have changed since they were built. They
+    /// know the shell as a whole, and are half of the work. Where many contacts have come or gone they are made anew.
+    void build(const CoupledSystem& system, Preconditioner kind, bool keepsCoarse = false);
     /// Only the bodies' blocks, after the contacts of an otherwise unchanged system have changed: the shells' factor of
     /// the old contacts, filtered by the new, is still positive definite. In double precision that is cheaper than a
     /// new one; in single a solve takes half the iterations with a new one, and leaves less of rigid motions over.
@@ -41,13 +43,15 @@ class CoupledPreconditioner {
         mutable Eigen::VectorXd part;
     };
 
-    void buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind);
+    void buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind, bool keepsCoarse);
     bool factorCompletely(const CoupledSystem& system, std::size_t shell);
     bool isCompact(const CoupledSystem& system, std::size_t shell) const;
     /// What the other apply does to a system in single precision, of one shell of a system in double.
     void applyCompact(const CoupledSystem::ShellPart& part, const Points& r, Points& z) const;
     void findFree(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
     void buildCoarse(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
+    static bool knowsContacts(const CoupledSystem& system, const CoupledSystem::ShellPart& part,
+                              const CoarseSpace& coarse);
     void eliminateShells(const CoupledSystem& system);
     double alongComplete(const CoupledSystem& system, const Points& a, const Points& b) const;
     void applyToBodies(const Eigen::Matrix<double, 6, Eigen::Dynamic>& r,
