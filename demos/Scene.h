@@ -76,7 +76,7 @@ struct ShellDescription {
     BendingModel bending;
     double friction = 0.5;         ///< [-]
     double restitution = 0.0;      ///< 0 to 1 [-]
-    double tolerance = 1e-3;       ///< of the linear solve, relative
+    double tolerance = 1e-2;       ///< of the linear solve, relative
     int maxIterations = 1000;      ///< of one linear solve
     double contactThickness = -1;  ///< [m]; < 0: half the thickness
     Integrator integrator = Integrator::BackwardEuler;

@@ -26,6 +26,8 @@ constexpr double kMostGainOfFast = 0.1;    ///< the same where a body goes farth
 constexpr double kMostOvertaking = 3.0;    ///< of a shell that is pushed: its speed over the pushing body's
 constexpr double kMostEnergyGain = 1.0;    ///< of a step that is accepted as it is
 
+constexpr double kRough = 0.03;  ///< tolerance of a rough solve
+
 constexpr int kLeastForTeam = 1000;  ///< vertices of an island from which on threads pay
 constexpr int kLeastCompact = 200;   ///< vertices of a shell from which on a coarse space pays in double precision
 
@@ -622,11 +624,12 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
     lap.addTo(times.assembly);
 }
 
-/// Bodies rest on the solution: what the solve leaves over is a force on them.
+/// The least of the shells'. Bodies rest on the solution: what the solve leaves over is a force on them.
 double IslandSolver::Impl::linearTolerance(const IslandInput& input) const {
+    constexpr double kMostWithBodies = 1e-4;
     double tolerance = input.shells[0]->settings().tolerance;
     for (const Shell* shell : input.shells) tolerance = std::min(tolerance, shell->settings().tolerance);
-    return (dynamicBodies.empty() ? 1.0 : 0.1) * tolerance;
+    return dynamicBodies.empty() ? tolerance : std::min(kMostWithBodies, 0.1 * tolerance);
 }
 
 void IslandSolver::Impl::readFreeTwists() {
@@ -646,7 +649,6 @@ double IslandSolver::Impl::floorOfReference(const IslandInput& input, double sha
 /// From `guess`, with the present contacts and preconditioner.
 PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, int maxIterations, StepReport& report) {
     constexpr double kCompleteTolerance = 1e-6;  // of what a solve starts with, where it takes a few iterations
-    constexpr double kRough = 0.03;              // tolerance of a rough solve
     constexpr double kShare = 0.1;               // which leaves at most this of the residual that it starts with
     const double tolerance = linearTolerance(input);
     system.start(start, freeTwist, u);  // dv = 0
@@ -693,13 +695,14 @@ void IslandSolver::Impl::solveRound(const IslandInput& input, bool roughly, int&
 }
 
 /// Until the contacts agree with the motion that they lead to. Where that is asked only once, and they changed in the
-/// last step, a rough solve tells enough.
+/// last step, a rough solve tells enough, if it is by far cheaper than one to the tolerance.
 void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& report) {
     guess = report.solves == 0 ? expected : v;
     guessTwist = report.solves == 0 ? freeTwist : u.w;
     u.resize(static_cast<int>(start.cols()), system.bodyCount());
     int freshIterations = -1;  // of the first solve with the present factor
-    bool roughly = response.isQuick() && response.hasContacts() && lastRounds > 1;
+    const bool isCheap = linearTolerance(input) < 0.1 * kRough;
+    bool roughly = isCheap && response.isQuick() && response.hasContacts() && lastRounds > 1;
     int round = 0;
     for (;;) {
         LapTimer writing(input);

@@ -39,6 +39,22 @@ run bowl bowl
 printf '%40s %6s\n' "cloth_sphere, finite differences" "$(per_second finite_difference)" \
     "cloth_sphere, quadratic" "$(per_second quadratic)" "bowl, cubic shell" "$(per_second bowl)"
 
+# iterations NAME: mean of a step.
+iterations() { sed -n '/"pcg_iterations"/,/}/p' "$out/$1/result.json" | sed -n 's/.*"mean": *\([0-9.e-]*\).*/\1/p'; }
+
+echo
+echo "drape, 71 x 71, over eight spheres whose radii differ by 0.05 mm: what the tolerance of the linear solve changes"
+printf '%10s %12s %14s %14s %14s %14s\n' "tolerance" "iterations" "end stretch" "largest of 8" "peak stretch" "largest of 8"
+for tolerance in 1e-2 1e-3 1e-4; do
+    for i in 0 1 2 3 4 5 6 7; do
+        run "d$i" drape --set 'shells.0.mesh.grid.cells=[70,70]' --set "shells.0.tolerance=$tolerance" \
+            --set "bodies.0.shape.sphere=$(awk -v i="$i" 'BEGIN { print 0.5 + 5e-5 * i }')"
+        echo "$(iterations "d$i") $(value "d$i" max_stretch) $(value "d$i" peak_stretch)"
+    done | awk -v tolerance="$tolerance" '
+        { it += $1; end += $2; peak += $3; if ($2 > most) most = $2; if ($3 > highest) highest = $3 }
+        END { printf "%10s %12.1f %14.4f %14.4f %14.4f %14.4f\n", tolerance, it / NR, end / NR, most, peak / NR, highest }'
+done
+
 echo
 echo "free sheet and spinning ball, no gravity: relative change of linear momentum"
 run free free_sheet_ball

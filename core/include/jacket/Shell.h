@@ -32,7 +32,9 @@ struct ShellSettings {
     BendingModel bending = PatchBending{};
     Integrator integrator = Integrator::BackwardEuler;
     Preconditioner preconditioner = Preconditioner::IncompleteCholesky;  ///< of an island: its first shell's
-    double tolerance = 1e-3;   ///< of the linear solve, relative, in the preconditioner's norm
+    /// Of the linear solve, relative, in the preconditioner's norm. Where bodies that a shell can move take part, a
+    /// tenth of it, and at most 1e-4.
+    double tolerance = 1e-2;
     int maxIterations = 1000;  ///< of one linear solve
     bool plasticity = false;   ///< keep bends and stretches beyond the material's yield stress
 };

@@ -29,7 +29,7 @@ struct ShellOptions {
     Integrator integrator = Integrator::BackwardEuler;
     bool plasticity = false;             ///< keep bends and stretches beyond the material's yield stress
     std::vector<ShellRegion> regions{};  ///< later ones win where they overlap
-    double tolerance = 1e-3;             ///< of the linear solve, relative
+    double tolerance = 1e-2;             ///< of the linear solve, relative; see ShellSettings
     int maxIterations = 1000;            ///< of one linear solve
     double friction = 0.5;               ///< multiplied with the body's, as Bullet does [-]
     double restitution = 0.0;            ///< 0 to 1, multiplied with the body's, as Bullet does [-]
