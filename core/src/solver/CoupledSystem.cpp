@@ -103,7 +103,6 @@ void CoupledSystem::multiply(const Points& v, Points& q) const {
 const Points& CoupledSystem::multiplyFrom(Product& last, const Points& v) const {
     constexpr int kFew = 8;  // of so many vertices one: a column takes longer than a row
     m_moved.clear();
-    last.isValid = last.isValid && m_precision == Precision::Single;
     for (int i = 0; last.isValid && i < m_vertexCount; ++i)
         if (v.col(i) != last.v.col(i)) m_moved.push_back(i);
     if (!last.isValid || kFew * static_cast<int>(m_moved.size()) > m_vertexCount) {
@@ -117,8 +116,8 @@ const Points& CoupledSystem::multiplyFrom(Product& last, const Points& v) const 
                                                        last.q.data() + 3 * shell->offset);
         }
     }
-    last.v = v;
-    last.isValid = true;
+    last.isValid = m_precision == Precision::Single;  // in double no columns are at hand
+    if (last.isValid) last.v = v;
     return last.q;
 }
 
