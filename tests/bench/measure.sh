@@ -15,7 +15,8 @@ run() {
 }
 # value NAME KEY: a number or word of result.json, which has one key a line.
 value() { sed -n "s/^ *\"$2\": *\([^,]*\),\{0,1\}$/\1/p" "$out/$1/result.json" | head -n 1; }
-median() { sed -n '/"ms_per_step"/,/}/p' "$out/$1/result.json" | sed -n 's/.*"median": *\([0-9.e-]*\).*/\1/p'; }
+# part NAME KEY PART: a number of an object of result.json.
+part() { sed -n "/\"$2\"/,/}/p" "$out/$1/result.json" | sed -n "s/.*\"$3\": *\([0-9.e-]*\).*/\1/p"; }
 per_second() { awk -v f="$(value "$1" frames)" -v w="$(value "$1" wall_s)" 'BEGIN { printf "%.0f", f / w }'; }
 ball_height() {
     tr -d ' \n' <"$out/$1/result.json" | sed -n 's/.*"name":"ball","position":\[[^,]*,\([^,]*\),.*/\1/p'
@@ -28,7 +29,7 @@ printf '%10s %14s %12s %12s %10s %10s\n' "vertices" "penetration/m" "ball y/m" "
 for n in 11 31 71 101; do
     run "t$n" trampoline --set "shells.0.mesh.grid.cells=[$((n - 1)),$((n - 1))]"
     printf '%10s %14s %12.4f %12s %10s %10s\n' "$n x $n" "$(value "t$n" max_penetration)" "$(ball_height "t$n")" \
-        "$(value "t$n" peak_stretch)" "$(median "t$n")" "$(value "t$n" converged)"
+        "$(value "t$n" peak_stretch)" "$(part "t$n" ms_per_step median)" "$(value "t$n" converged)"
 done
 
 echo
@@ -39,9 +40,6 @@ run bowl bowl
 printf '%40s %6s\n' "cloth_sphere, finite differences" "$(per_second finite_difference)" \
     "cloth_sphere, quadratic" "$(per_second quadratic)" "bowl, cubic shell" "$(per_second bowl)"
 
-# iterations NAME: mean of a step.
-iterations() { sed -n '/"pcg_iterations"/,/}/p' "$out/$1/result.json" | sed -n 's/.*"mean": *\([0-9.e-]*\).*/\1/p'; }
-
 echo
 echo "drape, 71 x 71, over eight spheres whose radii differ by 0.05 mm: what the tolerance of the linear solve changes"
 printf '%10s %12s %14s %14s %14s %14s\n' "tolerance" "iterations" "end stretch" "largest of 8" "peak stretch" "largest of 8"
@@ -49,7 +47,7 @@ for tolerance in 1e-2 1e-3 1e-4; do
     for i in 0 1 2 3 4 5 6 7; do
         run "d$i" drape --set 'shells.0.mesh.grid.cells=[70,70]' --set "shells.0.tolerance=$tolerance" \
             --set "bodies.0.shape.sphere=$(awk -v i="$i" 'BEGIN { print 0.5 + 5e-5 * i }')"
-        echo "$(iterations "d$i") $(value "d$i" max_stretch) $(value "d$i" peak_stretch)"
+        echo "$(part "d$i" pcg_iterations mean) $(value "d$i" max_stretch) $(value "d$i" peak_stretch)"
     done | awk -v tolerance="$tolerance" '
         { it += $1; end += $2; peak += $3; if ($2 > most) most = $2; if ($3 > highest) highest = $3 }
         END { printf "%10s %12.1f %14.4f %14.4f %14.4f %14.4f\n", tolerance, it / NR, end / NR, most, peak / NR, highest }'
