@@ -36,10 +36,10 @@ void ContactResponse::addFriction(const Touch& touch, Mat3& damping, Vec3& load)
 bool ContactResponse::updateFriction(const CoupledSystem& system) {
     if (++m_frictionRounds > kFrictionRounds) return false;
     double most = 0.0;
-    for (const Touch& touch : m_touches) most = std::max(most, touch.contact.friction * touch.normalImpulse);
+    for (const Touch& touch : m_touches) most = std::max(most, touch.contact.friction * touch.pressing);
     bool isWorthIt = false;
     for (Touch& touch : m_touches) {
-        const double limit = touch.contact.friction * touch.normalImpulse;
+        const double limit = touch.contact.friction * touch.pressing;
         if (!touch.active || touch.jammed || limit <= 0.0) continue;
         const double matters = kFrictionChange * std::max(limit, kMinor * most);
         const double change = touch.sticks ? updateSticking(touch, matters, vertexStiffness(system, touch))
@@ -57,11 +57,11 @@ bool ContactResponse::updateFrictionQuickly(bool rough) {
     if (!rough && ++m_frictionRounds > m_mostFrictionRounds) return false;
     double sum = 0.0, fresh = 0.0, excess = 0.0;
     for (Touch& touch : m_touches) {
-        const double limit = touch.contact.friction * touch.normalImpulse;
+        const double limit = touch.contact.friction * touch.pressing;
         if (!touch.active || touch.jammed || limit <= 0.0) continue;
         sum += limit;
         if (!touch.slip.known) fresh += limit;
-        excess += std::max(0.0, (touch.impulse - touch.normalImpulse * touch.contact.normal).norm() - limit);
+        excess += std::max(0.0, (touch.impulse - touch.pressing * touch.contact.normal).norm() - limit);
         if (!rough || !touch.slip.known) updateCreeping(touch);
     }
     return fresh > kMuch * sum || excess > kMuchTooMuch * sum;
@@ -73,7 +73,7 @@ bool ContactResponse::updateFrictionQuickly(bool rough) {
 /// each other on for ever.
 void ContactResponse::updateCreeping(Touch& touch) const {
     Slip& slip = touch.slip;
-    const double speed = touch.slide.norm(), limit = touch.contact.friction * touch.normalImpulse;
+    const double speed = touch.slide.norm(), limit = touch.contact.friction * touch.pressing;
     const bool turns = slip.known && touch.slide.dot(slip.direction) < 0.0;
     if (turns) ++touch.flips;
     const bool wasDamped = slip.known && slip.direction.isZero(0.0);
@@ -97,8 +97,8 @@ void ContactResponse::relaxDamping() {
 /// one would be thrown aside.
 void ContactResponse::dropExcessFriction() {
     for (Touch& touch : m_touches) {
-        const double force = (touch.impulse - touch.normalImpulse * touch.contact.normal).norm();
-        const double limit = touch.contact.friction * std::max(touch.normalImpulse, 0.0);
+        const double force = (touch.impulse - touch.pressing * touch.contact.normal).norm();
+        const double limit = touch.contact.friction * std::max(touch.pressing, 0.0);
         if (!touch.active || force <= kMostFriction * limit) continue;
         touch.sticks = false;
         touch.slip = {};
@@ -108,8 +108,8 @@ void ContactResponse::dropExcessFriction() {
 /// A contact slides once more holds it than friction can. Returns the change of its impulse [N s]; `matters`: what is
 /// worth another solve [N s]; `stiffness`: impulse over velocity of its vertices [kg].
 double ContactResponse::updateSticking(Touch& touch, double matters, double stiffness) const {
-    const double limit = touch.contact.friction * touch.normalImpulse;
-    const Vec3 held = touch.impulse - touch.normalImpulse * touch.contact.normal;
+    const double limit = touch.contact.friction * touch.pressing;
+    const Vec3 held = touch.impulse - touch.pressing * touch.contact.normal;
     const double force = held.norm();
     if (force <= limit + 0.05 * matters) {
         touch.slip.held = held;
@@ -146,7 +146,7 @@ double ContactResponse::updateSliding(Touch& touch, double matters, double stiff
     const Slip old = touch.slip;
     Slip& slip = touch.slip;
     slip.known = true;
-    slip.limit = touch.contact.friction * touch.normalImpulse;
+    slip.limit = touch.contact.friction * touch.pressing;
     slip.speed = touch.slide.norm();
     const bool turns = old.known && touch.slide.dot(old.direction) <= 0.0;
     const bool turnsNext = !old.known && wouldTurn(touch, slip.limit, stiffness);
@@ -159,7 +159,7 @@ double ContactResponse::updateSliding(Touch& touch, double matters, double stiff
     const bool damped = turns || touch.flips >= kMostFlips || slip.speed == 0.0;
     slip.direction = damped ? Vec3::Zero() : Vec3(touch.slide / slip.speed);
     if (damped && std::isfinite(old.speed)) slip.speed = std::max(slip.speed, old.speed);
-    const double force = (touch.impulse - touch.normalImpulse * touch.contact.normal).norm();
+    const double force = (touch.impulse - touch.pressing * touch.contact.normal).norm();
     if (force > kMostFriction * slip.limit + matters) return force;  // it slid much faster than was foreseen
     return (slip.limit * slip.direction - (old.known ? old.limit : 0.0) * old.direction).norm();
 }

@@ -14,6 +14,25 @@ constexpr double kOffsetDecay = 0.998;     // a step: a lift that is no longer n
 constexpr int kFrictionRoundsGoingOn = 2;  // the same where few are made and contacts are not new
 constexpr double kSameContact = 0.3;       // of an edge: how far the point of a face's contact may move in a step
 
+using Normals = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3>;
+using Shares = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
+
+/// What each of up to three normals takes of an impulse, by least squares.
+Shares sharesOf(const Vec3& impulse, const Normals& normals) {
+    using Gram = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
+    return Gram(normals.transpose() * normals).fullPivLu().solve(normals.transpose() * impulse);
+}
+
+/// The same where none may pull. Of two walls that face nearly the same way one may push by much what the other pulls:
+/// neither is what friction hangs on. `shares`: as above.
+Shares pushingSharesOf(const Vec3& impulse, const Normals& normals, const Shares& shares) {
+    if (normals.cols() == 1) return shares;
+    Shares result = shares;
+    Normals left = normals;
+    for (Eigen::Index k; result.minCoeff(&k) < 0.0; result = sharesOf(impulse, left)) left.col(k).setZero();
+    return result;
+}
+
 }  // namespace
 
 /// Near an edge the contacts of both its triangles are one, the edge's: a body that rolls over it keeps its contact.
@@ -482,10 +501,10 @@ bool ContactResponse::update(const CoupledSystem& system, const IslandVelocities
     return changed && !isLast(round);
 }
 
-/// All at once after the first solve; later only what ends deep inside a body, and friction.
+/// All at once after the first solve; later only what pulls by much, what ends deep inside a body, and friction.
 bool ContactResponse::updateQuickly(const IslandVelocities& solved, const Points& y, int round, bool rough) {
     findAtEnd(solved, y);
-    const bool released = round == 0 && releasePulling(round);
+    const bool released = releasePulling(round);
     const bool entered = (round == 0 || isAnyDeep()) && closeFound(solved, round);
     const bool slid = updateFrictionQuickly(rough);
     return (released || entered || slid) && !isLast(round);
@@ -494,17 +513,17 @@ bool ContactResponse::updateQuickly(const IslandVelocities& solved, const Points
 void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelocities& solved) {
     for (Touch& touch : m_touches) {
         touch.impulse.setZero();
-        touch.normalImpulse = 0.0;
+        touch.normalImpulse = touch.pressing = 0.0;
         if (touch.active) touch.slide = tangential(touch.contact.normal) * relativeVelocity(touch, solved);
         if (!touch.isRow) continue;
         const Vec3 u = relativeVelocity(touch, solved);
         const Vec3& n = touch.contact.normal;
         if (touch.jammed) {
             touch.impulse = touch.kappa * (touch.between * n - u);
-            touch.normalImpulse = n.dot(touch.impulse);
+            touch.normalImpulse = touch.pressing = n.dot(touch.impulse);
             continue;
         }
-        touch.normalImpulse = touch.lambda + touch.kappa * (touch.target - u.dot(n));
+        touch.normalImpulse = touch.pressing = touch.lambda + touch.kappa * (touch.target - u.dot(n));
         Mat3 damping = Mat3::Zero();
         touch.impulse = touch.normalImpulse * n;
         addFriction(touch, damping, touch.impulse);
@@ -512,36 +531,40 @@ void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelo
     }
     for (const auto& filter : m_filters) {
         const Vec3 total = -solved.unfiltered.col(system.constraints()[filter.constraint].vertex);
-        Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3> normals(3, filter.count);
+        Normals normals(3, filter.count);
         for (int k = 0; k < filter.count; ++k) normals.col(k) = m_touches[filter.touches[k]].contact.normal;
-        using Gram = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
-        const Gram gram = normals.transpose() * normals;
-        const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> along =
-            gram.fullPivLu().solve(normals.transpose() * total);
+        const Shares along = sharesOf(total, normals), pushing = pushingSharesOf(total, normals, along);
         for (int k = 0; k < filter.count; ++k) {
             Touch& touch = m_touches[filter.touches[k]];
             touch.normalImpulse = along[k];
-            touch.impulse = along[k] * touch.contact.normal;
+            touch.pressing = pushing[k];
+            touch.impulse = pushing[k] * touch.contact.normal;
         }
         Vec3& friction = m_touches[filter.touches[0]].impulse;
-        friction += total - normals * along;
+        friction += total - normals * pushing;
         if (filter.friction >= 0) friction += system.rowImpulse(system.rows()[filter.friction], solved.v, solved.w);
     }
 }
 
+/// Where few rounds are made, later ones let go only what pulls by much.
 bool ContactResponse::releasePulling(int round) {
+    constexpr double kMuch = 0.3;  // of the largest impulse
+    const bool isLater = isQuick() && round > 0;
     bool changed = false;
     double most = 0.0;
-    for (const Touch& touch : m_touches) most = std::max(most, touch.normalImpulse);
+    for (const Touch& touch : m_touches) most = std::max(most, touch.pressing);
     for (Touch& touch : m_touches) {
         if (!touch.active) continue;
-        const double pull = touch.isPinched ? kAmongWalls.pull : m_care.pull;
-        if (touch.normalImpulse < -pull * most && !touch.jammed && touch.changes < kMostChanges) {
+        const double pull = isLater ? kMuch : touch.isPinched ? kAmongWalls.pull : m_care.pull;
+        // In doubt a wall holds: what is released last may end inside it. One that moves would drag the shell along.
+        const bool isStill = touch.dynamicBody < 0 && touch.carried.isZero(0.0);
+        const bool mayGo = touch.changes < kMostChanges - isStill && !(isStill && isLast(round + 1));
+        if (touch.normalImpulse < -pull * most && !touch.jammed && mayGo) {
             touch.active = false;
             touch.lambda = 0.0;
             ++touch.changes;
             changed = true;
-        } else if (touch.isRow && !touch.isPinched) {
+        } else if (touch.isRow && !touch.isPinched && !isLater) {
             raiseMultiplier(touch);
         }
     }
@@ -578,13 +601,13 @@ void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
     m_memory.clear();
     m_memoryStep = m_input.h;
     for (const Touch& touch : m_touches) {
-        const bool pushes = touch.active && (touch.normalImpulse > 0.0 || touch.isVain) && !touch.bounces;
+        const bool pushes = touch.active && (touch.pressing > 0.0 || touch.isVain) && !touch.bounces;
         if (!touch.impulse.isZero(0.0))  // took part in the last solve
             impulses.push_back({touch.contact, touch.impulse, touch.sticks || creeps(touch), touch.slide});
         // Vertices that come and go in a sliding sheet are not without friction in the step in which they come back.
         const bool maySlideOn = isQuick() && touch.contact.isVertex() && touch.slip.known;
         if ((pushes || maySlideOn) && !m_forgotten.count(touch.contact.body))
-            m_memory[keyOf(touch.contact)] = {pushes && !touch.isVain ? touch.normalImpulse : 0.0,
+            m_memory[keyOf(touch.contact)] = {pushes && !touch.isVain ? touch.pressing : 0.0,
                                               pushes ? touch.offset : 0.0,
                                               touch.sticks,
                                               touch.slip,

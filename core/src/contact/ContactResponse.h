@@ -94,14 +94,15 @@ class ContactResponse {
         bool jammed = false;               ///< walls on both sides leave it no room
         double between = 0.0;              ///< its target then: half way to the other wall [m/s]
         Slip slip;
-        int flips = 0;         ///< between sticking and sliding, in this step
-        bool pressed = false;  ///< a wall faces it: it is not to be kept off the surface
-        double offset = 0.0;   ///< how far it is kept off the surface for its chords' sake [m]
-        double lifted = 0.0;   ///< by how much that grew in this round [m]
-        double normalImpulse = 0.0;
-        Vec3 impulse{0, 0, 0};  ///< on the shell [N s]
-        Vec3 slide{0, 0, 0};    ///< tangential velocity relative to the body in the last solve [m/s]
-        int changes = 0;        ///< how often it was activated or dropped
+        int flips = 0;               ///< between sticking and sliding, in this step
+        bool pressed = false;        ///< a wall faces it: it is not to be kept off the surface
+        double offset = 0.0;         ///< how far it is kept off the surface for its chords' sake [m]
+        double lifted = 0.0;         ///< by how much that grew in this round [m]
+        double normalImpulse = 0.0;  ///< < 0: it pulls, and is to be released [N s]
+        double pressing = 0.0;       ///< the same where walls that share its vertex may not pull [N s]
+        Vec3 impulse{0, 0, 0};       ///< on the shell [N s]
+        Vec3 slide{0, 0, 0};         ///< tangential velocity relative to the body in the last solve [m/s]
+        int changes = 0;             ///< how often it was activated or dropped
     };
     /// How exactly a step's contacts are settled; what remains is left to the next step.
     struct Care {
