@@ -550,14 +550,17 @@ void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelo
 bool ContactResponse::releasePulling(int round) {
     constexpr double kMuch = 0.3;  // of the largest impulse
     const bool isLater = isQuick() && round > 0;
+    const bool isWithoutBodies =
+        std::all_of(m_dynamicIndex.begin(), m_dynamicIndex.end(), [](int body) { return body < 0; });
     bool changed = false;
     double most = 0.0;
     for (const Touch& touch : m_touches) most = std::max(most, touch.pressing);
     for (Touch& touch : m_touches) {
         if (!touch.active) continue;
         const double pull = isLater ? kMuch : touch.isPinched ? kAmongWalls.pull : m_care.pull;
-        // In doubt a wall holds: what is released last may end inside it. One that moves would drag the shell along.
-        const bool isStill = touch.dynamicBody < 0 && touch.carried.isZero(0.0);
+        // In doubt a wall holds: what is released last may end inside it. One that moves would drag the shell along,
+        // and a light body would feel it.
+        const bool isStill = isWithoutBodies && touch.carried.isZero(0.0);
         const bool mayGo = touch.changes < kMostChanges - isStill && !(isStill && isLast(round + 1));
         if (touch.normalImpulse < -pull * most && !touch.jammed && mayGo) {
             touch.active = false;
