@@ -121,6 +121,7 @@ struct IslandSolver::Impl {
     mutable BodyVectors twistsAtEnd, freeMomentum,
         momentum;                                ///< of the bodies: twists at the end of the step, and momenta
     bool unsettled = false;                      ///< contacts of this step have used up their rounds
+    double reference = -1.0;                     ///< r^T P^-1 r that the tolerance refers to; < 0: not known
     int lastRounds = 1;                          ///< changes of the contacts in the last step, and one
     mutable std::vector<Points> at;              ///< where velocities lead each shell
     Points rigid;                                ///< velocities of shells that do not deform
@@ -621,6 +622,7 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
     system.begin(parts, static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(), supports.couplings(),
                  isSingle ? Precision::Single : Precision::Double, isSingle ? team : nullptr);
     readFreeTwists();
+    reference = -1.0;
     lap.addTo(times.assembly);
 }
 
@@ -651,10 +653,12 @@ PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, 
     constexpr double kCompleteTolerance = 1e-6;  // of what a solve starts with, where it takes a few iterations
     constexpr double kShare = 0.1;               // which leaves at most this of the residual that it starts with
     const double tolerance = linearTolerance(input);
-    system.start(start, freeTwist, u);  // dv = 0
-    const double floor = floorOfReference(input, preconditioner.isCoarse(system) ? 1.0 : 0.1);
-    const double atStart = pcg.begin(system, preconditioner, u, CoupledSystem::Kept::Start);
-    const double norm2 = std::max(atStart, floor);  // the tolerance refers to it
+    if (reference < 0.0 || system.precision() == Precision::Double) {
+        system.start(start, freeTwist, u);  // dv = 0
+        const double floor = floorOfReference(input, preconditioner.isCoarse(system) ? 1.0 : 0.1);
+        reference = std::max(pcg.begin(system, preconditioner, u), floor);
+    }
+    const double norm2 = reference;
     system.start(guess, guessTwist, u);
     const double rho = pcg.begin(system, preconditioner, u);
     double target2 = tolerance * tolerance * norm2;

@@ -48,7 +48,7 @@ void CoupledSystem::begin(const std::vector<ShellPart>& shells, int vertexCount,
     m_rows.clear();
     m_precision = precision;
     m_team = team;
-    for (Product& product : m_products) product.isValid = false;
+    m_last.isValid = false;
     m_compactPlaces.resize(vertexCount);
     for (const auto& shell : m_shells) {
         if (precision == Precision::Double && !shell.isCompact) continue;
@@ -99,9 +99,10 @@ void CoupledSystem::multiply(const Points& v, Points& q) const {
     }
 }
 
-/// A v, which `last` keeps. Where few vertices move otherwise than they did there, only their part is computed anew.
-const Points& CoupledSystem::multiplyFrom(Product& last, const Points& v) const {
+/// A v, which is kept. Where few vertices move otherwise than they did the last time, only their part is computed anew.
+const Points& CoupledSystem::multiplyFromLast(const Points& v) const {
     constexpr int kFew = 8;  // of so many vertices one: a column takes longer than a row
+    Product& last = m_last;
     m_moved.clear();
     for (int i = 0; last.isValid && i < m_vertexCount; ++i)
         if (v.col(i) != last.v.col(i)) m_moved.push_back(i);
@@ -222,9 +223,9 @@ void CoupledSystem::round(const CoupledVector& u, CompactVector& result) const {
     result.w = u.w;
 }
 
-void CoupledSystem::residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered, Kept kept) const {
+void CoupledSystem::residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered) const {
     velocities(u, m_v);
-    const Points& q = multiplyFrom(m_products[static_cast<std::size_t>(kept)], m_v);
+    const Points& q = multiplyFromLast(m_v);
     unfiltered.resize(3, m_vertexCount);
     for (const auto& shell : m_shells)
         unfiltered.middleCols(shell.offset, shell.rhs->cols()) =

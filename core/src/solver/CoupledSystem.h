@@ -131,12 +131,9 @@ class CoupledSystem {
     void filter(CompactVector& u) const;
     /// u rounded.
     void round(const CoupledVector& u, CompactVector& result) const;
-    /// Which of the products that are kept a residual is to start from: those of the step's start and of the present
-    /// solution differ from solve to solve only where contacts do.
-    enum class Kept { Start, Solution };
     /// r = filtered right side minus operator at u. `unfiltered` receives (b - A v) of every vertex: minus the
-    /// reactions.
-    void residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered, Kept kept = Kept::Solution) const;
+    /// reactions. Where a solve starts it differs from the last one's only where contacts do.
+    void residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered) const;
     /// Zero in the constrained directions.
     void filter(CoupledVector& u) const;
     /// What a soft row does: its impulse on the shell at absolute velocities v.
@@ -150,7 +147,7 @@ class CoupledSystem {
         bool isValid = false;
     };
     void multiply(const Points& v, Points& q) const;
-    const Points& multiplyFrom(Product& last, const Points& v) const;
+    const Points& multiplyFromLast(const Points& v) const;
     std::vector<ShellPart> m_shells;
     int m_vertexCount = 0;
     std::vector<Mat6> m_mass;
@@ -163,8 +160,8 @@ class CoupledSystem {
     WorkerTeam* m_team = nullptr;
     std::vector<int> m_compactPlaces;
     mutable std::vector<Eigen::Vector3f> m_saved;
-    mutable std::array<Product, 2> m_products;  ///< of the present matrices, by Kept
-    mutable std::vector<int> m_moved;           ///< vertices: see multiplyFrom
+    mutable Product m_last;            ///< of the present matrices
+    mutable std::vector<int> m_moved;  ///< vertices: see multiplyFromLast
     mutable Points m_v, m_q;
     mutable Eigen::Matrix<double, 6, Eigen::Dynamic> m_w;
 };

@@ -73,9 +73,9 @@ double FilteredPcg::precondition(const CoupledSystem& system, const CoupledPreco
 }
 
 double FilteredPcg::begin(const CoupledSystem& system, const CoupledPreconditioner& preconditioner,
-                          const CoupledVector& u, CoupledSystem::Kept kept) {
+                          const CoupledVector& u) {
     resize(system);
-    system.residual(u, m_r, m_unfiltered, kept);
+    system.residual(u, m_r, m_unfiltered);
     return precondition(system, preconditioner);
 }
 
@@ -90,8 +90,10 @@ PcgReport FilteredPcg::finish(const CoupledSystem& system, const CoupledPrecondi
         if (isSingle) {
             const double before = m_rho;
             m_before = u;
-            iterateCompact(system, preconditioner, m_rho, target, maxIterations, report.iterations, u);
-            if (begin(system, preconditioner, u) <= kMostGrowth * before) continue;
+            m_rho = iterateCompact(system, preconditioner, m_rho, target, maxIterations, report.iterations, u);
+            system.residual(u, m_r, m_unfiltered);
+            if (m_rho <= target && isAsIterated(system)) break;
+            if (precondition(system, preconditioner) <= kMostGrowth * before) continue;
             u = m_before;
             begin(system, preconditioner, u);
             break;
@@ -124,8 +126,19 @@ double FilteredPcg::iterate(const CoupledSystem& system, const CoupledPreconditi
     return rho;
 }
 
-void FilteredPcg::iterateCompact(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho,
-                                 double target, int maxIterations, int& iterations, CoupledVector& u) {
+/// Whether m_r is what the iterations took it for, so that its norm need not be measured.
+bool FilteredPcg::isAsIterated(const CoupledSystem& system) {
+    constexpr double kSame = 0.05;
+    system.round(m_r, m_compactZ);
+    runRanges(system.team(), static_cast<int>(m_compactZ.s.size()), kFloatsAtATime,
+              [&](int i, int end) { turnKernel(end - i, -1.0f, m_compactR.s.data() + i, m_compactZ.s.data() + i); });
+    m_compactZ.w = m_compactR.w - m_compactZ.w;
+    return dot(system.team(), m_compactZ, m_compactZ) <= kSame * kSame * dot(system.team(), m_compactR, m_compactR);
+}
+
+/// Returns r^T P^-1 r as it knows it.
+double FilteredPcg::iterateCompact(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho,
+                                   double target, int maxIterations, int& iterations, CoupledVector& u) {
     constexpr double kMargin = 0.9;  // the residual as the iterations know it is not quite the true one
     WorkerTeam* const team = system.team();
     const int size = static_cast<int>(m_change.size());
@@ -155,6 +168,7 @@ void FilteredPcg::iterateCompact(const CoupledSystem& system, const CoupledPreco
     const std::vector<int>& place = system.compactPlaces();
     for (int i = 0; i < system.vertexCount(); ++i)
         u.s.col(i) += Eigen::Map<const Vec3>(m_change.data() + 4 * static_cast<std::size_t>(place[i]));
+    return rho;
 }
 
 }  // namespace jacket

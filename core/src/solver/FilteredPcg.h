@@ -17,11 +17,10 @@ class FilteredPcg {
     static constexpr double kLeastSingleTolerance = 1e-5;
 
     /// Starts at u, which must satisfy (I - S) s = z as every u does here; returns r^T P^-1 r there.
-    double begin(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, const CoupledVector& u,
-                 CoupledSystem::Kept kept = CoupledSystem::Kept::Solution);
+    double begin(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, const CoupledVector& u);
     /// After begin: improves u until r^T P^-1 r <= tolerance^2 reference. Of a system in single precision the
-    /// iterations are; the residual that they end with is measured in double, and where it is not small enough they
-    /// start again from it. Where they have made it much worse, u is left as it was.
+    /// iterations are; the residual that they end with is computed in double, and where it is not what they took it for
+    /// they start again from it. Where they have made it much worse, u is left as it was.
     PcgReport finish(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double reference,
                      double tolerance, int maxIterations, CoupledVector& u);
     /// All of it, from u.
@@ -39,8 +38,9 @@ class FilteredPcg {
     double precondition(const CoupledSystem& system, const CoupledPreconditioner& preconditioner);
     double iterate(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho, double target,
                    int maxIterations, int& iterations, CoupledVector& u);
-    void iterateCompact(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho,
-                        double target, int maxIterations, int& iterations, CoupledVector& u);
+    double iterateCompact(const CoupledSystem& system, const CoupledPreconditioner& preconditioner, double rho,
+                          double target, int maxIterations, int& iterations, CoupledVector& u);
+    bool isAsIterated(const CoupledSystem& system);
     CoupledVector m_r, m_z, m_d, m_q, m_before;
     double m_rho = 0.0;  ///< r^T P^-1 r of m_r
     CompactVector m_compactR, m_compactZ, m_compactD, m_compactQ;
