@@ -658,16 +658,15 @@ PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, 
         const double floor = floorOfReference(input, preconditioner.isCoarse(system) ? 1.0 : 0.1);
         reference = std::max(pcg.begin(system, preconditioner, u), floor);
     }
-    const double norm2 = reference;
     system.start(guess, guessTwist, u);
     const double rho = pcg.begin(system, preconditioner, u);
-    double target2 = tolerance * tolerance * norm2;
+    double target2 = tolerance * tolerance * reference;
     if (preconditioner.isComplete()) target2 = std::min(target2, kCompleteTolerance * kCompleteTolerance * rho);
-    if (roughly) target2 = std::max(target2, std::min(kRough * kRough * norm2, kShare * kShare * rho));
+    if (roughly) target2 = std::max(target2, std::min(kRough * kRough * reference, kShare * kShare * rho));
     const PcgReport solve = pcg.finish(system, preconditioner, target2, 1.0, maxIterations, u);
     ++report.solves;
     report.pcgIterations += solve.iterations;
-    report.residual = solve.residual * std::sqrt(target2 / norm2);
+    report.residual = solve.residual * std::sqrt(target2 / reference);
     report.converged = solve.converged;
     unfiltered = pcg.unfilteredResidual();
     return solve;

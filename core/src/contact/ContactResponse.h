@@ -46,7 +46,8 @@ class ContactResponse {
     /// Most negative gap that the last update predicted for the end of the step and that it wanted closed [m].
     double deepestGap() const { return m_deepestGap; }
     /// Whether nothing rests on the contacts and the shells give way: they are then looked at once, after a rough
-    /// solve, again only where a vertex ends deep inside a body, and pushOut does what is left.
+    /// solve if that is by far cheaper, again only where a contact pulls by much or a vertex ends deep inside a body,
+    /// and pushOut does what is left.
     bool isQuick() const { return m_care.rounds < kInFull.rounds; }
     /// By what pushOut would move vertices, of which some stay where they are [m].
     const std::pmr::map<int, Vec3>& pushes(const Points& v);

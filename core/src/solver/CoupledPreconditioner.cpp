@@ -62,16 +62,14 @@ bool CoupledPreconditioner::isComplete() const {
 void CoupledPreconditioner::findFree(const CoupledSystem& system, const CoupledSystem::ShellPart& part) {
     m_free.assign(part.matrix->size(), nullptr);
     for (const auto& c : system.constraints())
-        if (c.vertex >= part.offset && c.vertex < part.offset + part.matrix->size())
-            m_free[c.vertex - part.offset] = &c.free;
+        if (part.has(c.vertex)) m_free[c.vertex - part.offset] = &c.free;
 }
 
 /// Whether about as many vertices are constrained as when it was built: no more have come or gone than it has patches.
 bool CoupledPreconditioner::knowsContacts(const CoupledSystem& system, const CoupledSystem::ShellPart& part,
                                           const CoarseSpace& coarse) {
-    const auto held = std::count_if(system.constraints().begin(), system.constraints().end(), [&](const auto& c) {
-        return c.vertex >= part.offset && c.vertex < part.offset + part.matrix->size();
-    });
+    const auto held = std::count_if(system.constraints().begin(), system.constraints().end(),
+                                    [&](const auto& c) { return part.has(c.vertex); });
     return std::abs(static_cast<int>(held) - coarse.heldCount()) <= coarse.patchCount();
 }
 
@@ -79,14 +77,13 @@ void CoupledPreconditioner::buildCoarse(const CoupledSystem& system, const Coupl
     CompactShell& compact = part.matrix->compact();
     if (!part.positions) return compact.coarse.reset();
     if (!compact.coarse) compact.coarse = std::make_unique<CoarseSpace>(compact.matrix);
-    const int end = part.offset + part.matrix->size();
     const std::vector<int>& rowOf = compact.matrix.rowOf();
     m_free.assign(part.matrix->size(), nullptr);
     for (const auto& c : system.constraints())
-        if (c.vertex >= part.offset && c.vertex < end) m_free[rowOf[c.vertex - part.offset]] = &c.free;
+        if (part.has(c.vertex)) m_free[rowOf[c.vertex - part.offset]] = &c.free;
     m_ties.clear();
     for (const auto& row : system.rows()) {
-        if (row.vertices[0] < part.offset || row.vertices[0] >= end) continue;
+        if (!part.has(row.vertices[0])) continue;
         CoarseSpace::Tie tie{.rows = {}, .weights = row.weights, .stiffness = row.stiffness};
         for (int a = 0; a < 3; ++a) tie.rows[a] = rowOf[row.vertices[a] - part.offset];
         m_ties.push_back(tie);
@@ -105,9 +102,8 @@ bool CoupledPreconditioner::isCoarse(const CoupledSystem& system) const {
 }
 
 void CoupledPreconditioner::addRows(const CoupledSystem& system, const CoupledSystem::ShellPart& part) {
-    const int end = part.offset + part.matrix->size();
     for (const auto& row : system.rows()) {
-        if (row.vertices[0] < part.offset || row.vertices[0] >= end) continue;
+        if (!part.has(row.vertices[0])) continue;
         for (int a = 0; a < 3; ++a) {
             if (row.weights[a] == 0.0) continue;
             const int i = row.vertices[a] - part.offset;

@@ -84,6 +84,8 @@ class CoupledSystem {
         const Points* positions = nullptr;  ///< for a coarse space; null: without
         bool isFactored = false;            ///< completely
         bool isCompact = false;             ///< preconditioned in single precision, with a coarse space, in any case
+        /// Whether a vertex, in the island's numbering, is this shell's.
+        bool has(int vertex) const { return vertex >= offset && vertex < offset + matrix->size(); }
     };
 
     /// `couplings`: off-diagonal blocks of the mass, between dynamic bodies by their index here. `team` may help with
