@@ -53,6 +53,17 @@ TEST(Program, WritesEveryFileAndEveryKeyOfTheResult) {
     EXPECT_NEAR(result["probes"]["fall"].get<double>(), 10 * 21.0 / 3600, 1e-5);
 }
 
+/// A finger that comes down on a sheet which lies on a table lifts it around itself ring by ring: a round of contacts
+/// each.
+TEST(Program, SettlesTheContactsOfTheGripperThatCloses) {
+    const TemporaryFolder folder;
+    const Outcome run = jacket({"run", "gripper", "--seconds", "0.4", "--out", folder / "out", "--quiet"});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    const Json result = parseJson(TemporaryFolder::read(folder / "out/result.json"), "result.json");
+    EXPECT_EQ(result["unconverged_steps"], 0);
+    EXPECT_LT(result["max_penetration"].get<double>(), 1e-4);
+}
+
 TEST(Program, RunsTheSceneThatItWroteToTheSameEnd) {
     const TemporaryFolder folder;
     const std::string scene = folder.write("fall.json", kFallingSheet);

@@ -110,7 +110,8 @@ class ContactResponse {
         int rounds;   ///< solves, at most
         double pull;  ///< of the largest impulse: a contact that pulls less may stay for the step
     };
-    static constexpr Care kInFull{16, 1e-3};  ///< usually 1 to 3 are made; more while a body hits
+    /// Usually 1 to 3 are made; more while a body hits, or bears down on a sheet that lies.
+    static constexpr Care kInFull{24, 1e-3};
     /// What is stiff for its mesh passes on what a contact does to all others. Its rounds are cheap: see ShellFactor.
     static constexpr Care kStiff{48, 1e-3};
     static constexpr Care kAmongWalls{6, 0.02};
