@@ -773,7 +773,6 @@ void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
 /// bowl on its rim.
 bool IslandSolver::Impl::pushesStrain(const IslandInput& input) {
     constexpr double kMost = kMostEnergyGain;
-    constexpr double kNeighbourhood = 4;  // stiffness against moving one vertex alone, in E t
     if (!response.isQuick() || !unfiltered.allFinite()) return false;
     const auto& pushes = response.pushes(v);
     const auto energyAfter = [&] {
@@ -789,7 +788,7 @@ bool IslandSolver::Impl::pushesStrain(const IslandInput& input) {
         moving += 0.5 * shell.masses().sum() * (stepOf[k] * input.gravity).squaredNorm();
         const auto end = pushes.lower_bound(offsets[k] + shell.vertexCount());
         for (auto one = pushes.lower_bound(offsets[k]); one != end; ++one)
-            stretching += 0.5 * kNeighbourhood * shell.material().stretchStiffness() * one->second.squaredNorm();
+            stretching += strainOfPush(shell, one->second.norm());
     }
     if (stretching <= kMost * moving) return false;
     reached = v;

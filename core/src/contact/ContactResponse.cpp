@@ -35,6 +35,11 @@ Shares pushingSharesOf(const Vec3& impulse, const Normals& normals, const Shares
 
 }  // namespace
 
+double strainOfPush(const Shell& shell, double by) {
+    constexpr double kNeighbourhood = 4.0;  // stiffness against moving one vertex alone, in E t
+    return 0.5 * kNeighbourhood * shell.material().stretchStiffness() * by * by;
+}
+
 /// Near an edge the contacts of both its triangles are one, the edge's: a body that rolls over it keeps its contact.
 ContactResponse::Key ContactResponse::keyOf(const Contact& c) const {
     const Shell& shell = *m_input.shells[c.shell];
@@ -501,13 +506,37 @@ bool ContactResponse::update(const CoupledSystem& system, const IslandVelocities
     return changed && !isLast(round);
 }
 
-/// All at once after the first solve; later only what pulls by much, what ends deep inside a body, and friction.
+/// All at once after the first solve; later only what pulls by much, what ends deep inside a body, and friction. What
+/// hardly matters is noted for the next step, and pushOut does its part in this one.
 bool ContactResponse::updateQuickly(const IslandVelocities& solved, const Points& y, int round, bool rough) {
     findAtEnd(solved, y);
+    const bool matters = rough || isMuchUnmet();
     const bool released = releasePulling(round);
     const bool entered = (round == 0 || isAnyDeep()) && closeFound(solved, round);
     const bool slid = updateFrictionQuickly(rough);
-    return (released || entered || slid) && !isLast(round);
+    return ((matters && (released || entered)) || slid) && !isLast(round);
+}
+
+/// Whether contacts that pull, and moving out what ends inside bodies, amount to much: of all that pushes, or of what
+/// pushOut may strain. A sheet that has come to lie has a few of either in most steps.
+bool ContactResponse::isMuchUnmet() const {
+    constexpr double kMuch = 0.01, kMuchStrain = 0.25;
+    double pushing = 0.0, unmet = 0.0, strain = 0.0, kick = 0.0;
+    for (const Touch& touch : m_touches) {
+        pushing += std::max(touch.pressing, 0.0);
+        if (touch.active) unmet += std::max(-touch.normalImpulse, 0.0);
+    }
+    for (const Contact& contact : m_found) {
+        const Shell& shell = *m_input.shells[contact.shell];
+        const double by = std::max(-missing(contact, touchOf(contact)), 0.0);
+        strain += strainOfPush(shell, by);
+        for (int a = 0; a < 3; ++a)
+            if (contact.weights[a] > 0.0)
+                unmet += contact.weights[a] * shell.masses()[contact.vertices[a]] * by / m_input.h;
+    }
+    for (const Shell* shell : m_input.shells)
+        kick += 0.5 * shell->masses().sum() * (m_input.h * m_input.gravity).squaredNorm();
+    return unmet > kMuch * pushing || strain > kMuchStrain * kick;
 }
 
 void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelocities& solved) {

@@ -18,6 +18,9 @@ struct IslandVelocities {
     const Points& unfiltered;
 };
 
+/// About what moving one vertex of a shell strains it by while its neighbours stay [J].
+double strainOfPush(const Shell& shell, double by);
+
 /// Decides what contacts do to vertices: which hold (active set), which slide or stick, which become filter entries of
 /// a vertex and which soft rows. One step is begin, then writeTo, solve, update until update returns false, then
 /// finish.
@@ -186,6 +189,7 @@ class ContactResponse {
     bool updateQuickly(const IslandVelocities& solved, const Points& y, int round, bool rough);
     bool closeFound(const IslandVelocities& solved, int round);
     bool isAnyDeep() const;
+    bool isMuchUnmet() const;
     double missing(const Contact& contact, int touch) const;
     Vec3 armAtEnd(const Contact& contact) const;
     void relaxDamping();
