@@ -13,7 +13,7 @@ namespace {
 struct Factoring {
     const int *vertexOf, *rowStart, *column, *source, *pairStart, *pairs, *upperOf;
     const double *diagonal, *values;
-    double *inverse, *scaled, *left;
+    double *inverse, *scaled;
     float *root, *rootTransposed, *lower, *upper;
     double shift;
 };
@@ -85,11 +85,25 @@ JACKET_INLINE void storeRoot(const Triangular& t, float* root, float* rootTransp
         }
 }
 
-/// Of rows begin to end - 1. False where a pivot falls far below what it was in the matrix: the factor has broken down.
-JACKET_KERNEL bool factorKernel(const Factoring& factoring, int begin, int end) {
+/// What a row will read that is not where the last rows read.
+JACKET_INLINE void prefetchRow(const Factoring& f, int row) {
+    __builtin_prefetch(f.diagonal + 9 * static_cast<std::size_t>(f.vertexOf[row]));
+    for (int k = f.rowStart[row]; k < f.rowStart[row + 1]; ++k) {
+        const int source = f.source[k];
+        const double* const values = f.values + 9 * static_cast<std::size_t>(source >= 0 ? source : ~source);
+        __builtin_prefetch(values);
+        __builtin_prefetch(values + 8);
+    }
+}
+
+/// Of rows begin to end - 1; `row`: room for the blocks of L in one of them. False where a pivot falls far below what
+/// it was in the matrix: the factor has broken down.
+JACKET_KERNEL bool factorKernel(const Factoring& factoring, int begin, int end, double* row) {
     constexpr double kLeast = 1e-3;
+    constexpr int kRowsAhead = 4;   // rows between prefetch and use
     const Factoring f = factoring;  // nobody writes there
     for (int i = begin; i < end; ++i) {
+        if (i + kRowsAhead < end) prefetchRow(f, i + kRowsAhead);
         Double4 d[3] = {};
         loadBlock(f.diagonal + 9 * static_cast<std::size_t>(f.vertexOf[i]), d);
         const Triangular before = triangular(d);
@@ -100,7 +114,7 @@ JACKET_KERNEL bool factorKernel(const Factoring& factoring, int begin, int end) 
             loadBlock(f.values + 9 * static_cast<std::size_t>(isLower ? f.source[k] : ~f.source[k]), block);
             if (!isLower) transpose(block);
             for (int pair = f.pairStart[k]; pair < f.pairStart[k + 1]; ++pair) {
-                loadBlock(f.left + 9 * f.pairs[2 * pair], left);
+                loadBlock(row + 9 * (f.pairs[2 * pair] - f.rowStart[i]), left);
                 subtractTransposedProduct(left, f.scaled + 9 * f.pairs[2 * pair + 1], block);
             }
             storeBlock(block, f.scaled + 9 * k);
@@ -108,7 +122,7 @@ JACKET_KERNEL bool factorKernel(const Factoring& factoring, int begin, int end) 
             for (int column = 0; column < 3; ++column)
                 left[column] = block[0] * inverse[3 * column] + block[1] * inverse[3 * column + 1] +
                                block[2] * inverse[3 * column + 2];
-            storeBlock(left, f.left + 9 * k);
+            storeBlock(left, row + 9 * (k - f.rowStart[i]));
             subtractTransposedProduct(left, f.scaled + 9 * k, d);
             storeRounded(left, f.lower + 9 * k);
             transpose(left);
@@ -177,7 +191,9 @@ CompactFactor::CompactFactor(const CompactMatrix& matrix)
         }
     m_inverse.assign(9 * m_size, 0.0);
     for (auto* perRow : {&m_root, &m_rootTransposed}) perRow->assign(9 * m_size + 3, 0.0f);
-    for (auto* perBlock : {&m_scaled, &m_left}) perBlock->assign(9 * m_column.size(), 0.0);
+    m_scaled.assign(9 * m_column.size(), 0.0);
+    for (int row = 0; row < m_size; ++row) m_mostInRow = std::max(m_mostInRow, m_rowStart[row + 1] - m_rowStart[row]);
+    m_rows.assign(9 * static_cast<std::size_t>(m_mostInRow) * stripCount(), 0.0);
     for (auto* perBlock : {&m_lower, &m_upper}) perBlock->assign(9 * m_column.size() + 3, 0.0f);
 }
 
@@ -196,7 +212,6 @@ void CompactFactor::factor(const std::vector<Mat3>& diagonal, const std::vector<
                 lower.empty() ? nullptr : lower.data()->data(),
                 m_inverse.data(),
                 m_scaled.data(),
-                m_left.data(),
                 m_root.data(),
                 m_rootTransposed.data(),
                 m_lower.data(),
@@ -206,7 +221,8 @@ void CompactFactor::factor(const std::vector<Mat3>& diagonal, const std::vector<
     const auto factorParts = [&](int first, int count) {
         std::atomic<bool> works = true;
         runParts(team, count, [&](int i) {
-            if (!factorKernel(f, m_partStart[first + i], m_partStart[first + i + 1])) works = false;
+            double* const row = m_rows.data() + 9 * static_cast<std::size_t>(m_mostInRow) * i;
+            if (!factorKernel(f, m_partStart[first + i], m_partStart[first + i + 1], row)) works = false;
         });
         return works.load();
     };

@@ -40,9 +40,11 @@ class CompactFactor {
     std::vector<int> m_pairStart, m_pairs;
     /// Strictly upper blocks of L^T by rows, and the place there of each lower block.
     std::vector<int> m_upperStart, m_upperColumn, m_upperOf;
-    std::vector<double> m_inverse, m_scaled, m_left;  ///< D^-1, L D, L
-    std::vector<float> m_root, m_rootTransposed;      ///< W and W^T, W^T W = D^-1
-    std::vector<float> m_lower, m_upper;              ///< L, L^T
+    std::vector<double> m_inverse, m_scaled;      ///< D^-1, L D
+    int m_mostInRow = 0;                          ///< lower blocks
+    std::vector<double> m_rows;                   ///< scratch: one row of L for each strip
+    std::vector<float> m_root, m_rootTransposed;  ///< W and W^T, W^T W = D^-1
+    std::vector<float> m_lower, m_upper;          ///< L, L^T
     double m_shift = 0.0;
 };
 
