@@ -54,15 +54,22 @@ JACKET_KERNEL void addConstantGradient(const ConstantRows& rows, int begin, int 
     }
 }
 
-/// x . K x
+JACKET_INLINE void loadPosition(const ConstantRows& rows, int i, Double4& to) {
+    std::memcpy(&to, rows.x + 4 * static_cast<std::size_t>(i), sizeof(to));
+}
+
+/// x . K x = -sum_{i<j} K_ij |x_j - x_i|^2, for the same reason.
 JACKET_KERNEL double constantProduct(const ConstantRows& rows) {
-    double product[4] = {};
+    Double4 sum{};
     for (int i = 0; i < rows.count; ++i) {
-        double sum[4];
-        multiplyRow(rows, i, sum);
-        for (int c = 0; c < 4; ++c) product[c] += sum[c] * rows.x[4 * i + c];
+        Double4 xi, xj;
+        loadPosition(rows, i, xi);
+        for (int k = rows.start[i + 1] - 1; k >= rows.start[i] && rows.column[k] > i; --k) {
+            loadPosition(rows, rows.column[k], xj);
+            sum -= rows.value[k] * ((xj - xi) * (xj - xi));
+        }
     }
-    return product[0] + product[1] + product[2];
+    return sum[0] + sum[1] + sum[2];
 }
 
 }  // namespace
