@@ -109,6 +109,18 @@ TrianglePoint SphereForm::nearestOfTriangle(const Mat3& triangle) const {
     return touching(b, b.point / distance, distance - radius);
 }
 
+bool SphereForm::isBeyond(const Mat3& triangle, double reach) const {
+    const Vec3 corner = triangle.col(0), e0 = triangle.col(1) - corner, e1 = triangle.col(2) - corner;
+    const Vec3 n = e0.cross(e1);
+    const double size = std::sqrt(std::max(e0.squaredNorm(), e1.squaredNorm())), area2 = n.squaredNorm();
+    const double far = radius + reach + 1e-7 * (size + radius);  // more than rounding can add
+    if (!(far >= 0)) return false;
+    if (corner.squaredNorm() > (far + size) * (far + size)) return true;
+    const double height = n.dot(corner);
+    const bool isSliver = !(area2 > 1e-16 * size * size * size * size);  // its normal may be any
+    return !isSliver && height * height > far * far * area2;
+}
+
 Vec3 SphereForm::support(const Vec3& direction) const {
     return radius * direction;
 }

@@ -31,6 +31,8 @@ struct SphereForm {
     double radius;  // [m]
     SurfacePoint nearest(const Vec3& p) const;
     TrianglePoint nearestOfTriangle(const Mat3& triangle) const;
+    /// Whether all of a triangle is farther than `reach` off, by its plane and one corner: true only if it is.
+    bool isBeyond(const Mat3& triangle, double reach) const;
     Vec3 support(const Vec3& direction) const;
     Vec3 halfExtents() const { return Vec3::Constant(radius); }
 };

@@ -116,6 +116,8 @@ struct ExactSolid {
         return s.distance <= reach ? std::optional(s) : std::nullopt;
     }
     std::optional<TrianglePoint> touch(const Mat3& triangle, double reach) const {
+        if constexpr (requires { form.isBeyond(triangle, reach); })
+            if (form.isBeyond(triangle, reach)) return std::nullopt;
         const TrianglePoint t = form.nearestOfTriangle(triangle);
         return t.surface.distance <= reach ? std::optional(t) : std::nullopt;
     }

@@ -335,6 +335,32 @@ TEST(ClosedForms, NearestPointOfTriangles) {
     }
 }
 
+/// What is said to be beyond reach is; of what is by more than its sides, all is said to be.
+TEST(ClosedForms, TrianglesBeyondReachOfASphereAreFarther) {
+    Random random(31);
+    int farther = 0, said = 0;
+    for (int i = 0; i < 20000; ++i) {
+        const SphereForm sphere{random.scale()};
+        const double size = random.scale(), reach = random.between(-0.9, 1.5) * sphere.radius;
+        const Vec3 corner = (sphere.radius + random.between(-2, 2) * size) * random.direction();
+        Mat3 triangle;
+        for (int c = 0; c < 3; ++c) triangle.col(c) = corner + size * random.direction();
+        if (i % 3 == 0)  // a sliver, or less
+            triangle.col(2) = triangle.col(0) + random.between(-1, 2) * (triangle.col(1) - triangle.col(0)) +
+                              std::pow(10.0, random.between(-20, -6)) * size * random.direction();
+        const double distance = sphere.nearestOfTriangle(triangle).surface.distance;
+        const bool isBeyond = sphere.isBeyond(triangle, reach);
+        if (isBeyond) {
+            EXPECT_GT(distance, reach) << "radius " << sphere.radius << "\n" << triangle;
+        }
+        if (distance < reach + 4.0 * size) continue;
+        ++farther;
+        said += isBeyond;
+    }
+    EXPECT_GT(farther, 1000);
+    EXPECT_EQ(said, farther);
+}
+
 TEST(ClosedForms, SymmetricPosesHaveUnitNormals) {
     Random random(4);
     for (const auto& [name, make] : closedForms())
