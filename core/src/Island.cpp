@@ -224,7 +224,7 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
         count += shell->vertexCount();
     }
     start.resize(3, count);
-    rigid.resize(3, count);
+    for (Points* seldomUsed : {&rigid, &newtonFrom, &calmest}) seldomUsed->resize(3, count);
     at.resize(std::max(at.size(), input.shells.size()));
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const int n = input.shells[k]->vertexCount();

@@ -284,6 +284,7 @@ void ContactResponse::pushOut(Points& v, std::vector<ContactImpulse>& impulses) 
 /// the step was looked at.
 void ContactResponse::findPushes(const Points& v) {
     m_pushes.clear();
+    m_pushes.reserve(m_found.capacity() + m_touches.capacity());  // asks for memory only when they do
     std::pmr::set<int> found(&m_pool);
     std::pmr::multimap<int, const Contact*> near(&m_pool);  // of each vertex
     for (const Contact& contact : m_found) {
