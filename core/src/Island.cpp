@@ -110,7 +110,7 @@ struct IslandSolver::Impl {
     std::vector<char> factored;      ///< shells: completely
     bool givesWay = true;            ///< false, as long as anything touches: see pushesStrain
     Points lastChange;               ///< dv of the last step
-    Points expected;                 ///< velocities if that goes on: the warm start
+    Points expected;                 ///< velocities if that goes on
     Points unfiltered;               ///< (b - A v) at the solution, soft rows included
     CoupledVector u;
     Points guess, reached;       ///< velocities: what a solve starts from, and what the last one led to
@@ -648,18 +648,25 @@ double IslandSolver::Impl::floorOfReference(const IslandInput& input, double sha
     return sum * kick * kick;
 }
 
-/// From `guess`, with the present contacts and preconditioner.
+/// From `guess`, with the present contacts and preconditioner. The first solve of a step, but for small shells and in
+/// double precision, is from no change of velocity: the last change is in part what the last solve left over, to be
+/// undone and not to be repeated.
 PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, int maxIterations, StepReport& report) {
     constexpr double kCompleteTolerance = 1e-6;  // of what a solve starts with, where it takes a few iterations
     constexpr double kShare = 0.1;               // which leaves at most this of the residual that it starts with
+    constexpr int kLarge = 200;                  // vertices
     const double tolerance = linearTolerance(input);
+    const bool isCoarse = preconditioner.isCoarse(system);
+    double rho = 0.0;
     if (reference < 0.0 || system.precision() == Precision::Double) {
         system.start(start, freeTwist, u);  // dv = 0
-        const double floor = floorOfReference(input, preconditioner.isCoarse(system) ? 1.0 : 0.1);
-        reference = std::max(pcg.begin(system, preconditioner, u), floor);
+        rho = pcg.begin(system, preconditioner, u);
+        reference = std::max(rho, floorOfReference(input, isCoarse ? 1.0 : 0.1));
     }
-    system.start(guess, guessTwist, u);
-    const double rho = pcg.begin(system, preconditioner, u);
+    if (report.solves > 0 || !isCoarse || start.cols() < kLarge) {
+        system.start(guess, guessTwist, u);
+        rho = pcg.begin(system, preconditioner, u);
+    }
     double target2 = tolerance * tolerance * reference;
     if (preconditioner.isComplete()) target2 = std::min(target2, kCompleteTolerance * kCompleteTolerance * rho);
     if (roughly) target2 = std::max(target2, std::min(kRough * kRough * reference, kShare * kShare * rho));

@@ -64,6 +64,16 @@ TEST(Program, SettlesTheContactsOfTheGripperThatCloses) {
     EXPECT_LT(result["max_penetration"].get<double>(), 1e-4);
 }
 
+/// Going on in each step as in the last one took 16 to 18: a sheet that slides over a ball changes its mind.
+TEST(Program, DrapesASheetInFewIterations) {
+    const TemporaryFolder folder;
+    const Outcome run =
+        jacket({"run", "drape", "--set", "shells.0.mesh.grid.cells=[70,70]", "--out", folder / "out", "--quiet"});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    const Json result = parseJson(TemporaryFolder::read(folder / "out/result.json"), "result.json");
+    EXPECT_LT(result["pcg_iterations"]["mean"].get<double>(), 15.0);  // 10 to 14: rounding decides how it folds
+}
+
 TEST(Program, RunsTheSceneThatItWroteToTheSameEnd) {
     const TemporaryFolder folder;
     const std::string scene = folder.write("fall.json", kFallingSheet);
