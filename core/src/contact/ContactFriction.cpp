@@ -93,6 +93,12 @@ void ContactResponse::relaxDamping() {
             touch.slip.speed = std::max(touch.slip.speed, touch.slide.norm());
 }
 
+/// As if no solve had told its normal impulse yet.
+void ContactResponse::dropFriction(Touch& touch) {
+    touch.sticks = false;
+    touch.slip = {};
+}
+
 /// Where contacts have not settled before the last solve, none may hold a body by more friction than there is: a light
 /// one would be thrown aside.
 void ContactResponse::dropExcessFriction() {
@@ -100,8 +106,7 @@ void ContactResponse::dropExcessFriction() {
         const double force = (touch.impulse - touch.pressing * touch.contact.normal).norm();
         const double limit = touch.contact.friction * std::max(touch.pressing, 0.0);
         if (!touch.active || force <= kMostFriction * limit) continue;
-        touch.sticks = false;
-        touch.slip = {};
+        dropFriction(touch);
     }
 }
 

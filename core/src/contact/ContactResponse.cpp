@@ -117,8 +117,9 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     for (const auto& anchor : input.anchors) m_held[m_offsets[anchor.shell] + anchor.vertex] = 1;
     if (!input.contacts) return;
 
-    m_care = isAmongWalls() && !isAnyStiff() && numbering.givesWay ? kAmongWalls : kInFull;
-    if (numbering.isAnyFactored) m_care = kStiff;
+    const Care inFull = hasFreeBodies() ? kInFull : kAtLength;
+    m_care = isAmongWalls() && !isAnyStiff() && numbering.givesWay ? kAmongWalls : inFull;
+    if (numbering.isAnyFactored) m_care = kAtLength;
     m_creep = creepSpeed();
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);
     m_faceSlop = std::min(2e-4, 1e-2 * shortest);
@@ -134,9 +135,13 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     findRoomBesideFaces();
     for (const Contact& contact : m_found) addAtStart(contact, y);
     findFast();
-    if (isQuick() && (isAnyBouncy() || m_anyFast)) m_care = kInFull;
+    if (isQuick() && (isAnyBouncy() || m_anyFast)) m_care = inFull;
     if (m_anyFast) sweepAtStart();
     keepEarliest();
+}
+
+bool ContactResponse::hasFreeBodies() const {
+    return std::any_of(m_dynamicIndex.begin(), m_dynamicIndex.end(), [](int body) { return body >= 0; });
 }
 
 /// Whether nothing rests on the contacts or is thrown by them, and nothing squeezes a shell.
@@ -579,8 +584,7 @@ void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelo
 bool ContactResponse::releasePulling(int round) {
     constexpr double kMuch = 0.3;  // of the largest impulse
     const bool isLater = isQuick() && round > 0;
-    const bool isWithoutBodies =
-        std::all_of(m_dynamicIndex.begin(), m_dynamicIndex.end(), [](int body) { return body < 0; });
+    const bool isWithoutBodies = !hasFreeBodies();
     bool changed = false;
     double most = 0.0;
     for (const Touch& touch : m_touches) most = std::max(most, touch.pressing);
@@ -596,6 +600,9 @@ bool ContactResponse::releasePulling(int round) {
             touch.lambda = 0.0;
             ++touch.changes;
             changed = true;
+            // What pulls has no friction either. Held by both it would come back and stick: what the friction held can
+            // lead into the wall by more than what pulled led out of it.
+            if (!isQuick() && touch.dynamicBody < 0) dropFriction(touch);
         } else if (touch.isRow && !touch.isPinched && !isLater) {
             raiseMultiplier(touch);
         }

@@ -115,8 +115,9 @@ class ContactResponse {
     };
     /// Usually 1 to 3 are made; more while a body hits, or bears down on a sheet that lies.
     static constexpr Care kInFull{24, 1e-3};
-    /// What is stiff for its mesh passes on what a contact does to all others. Its rounds are cheap: see ShellFactor.
-    static constexpr Care kStiff{48, 1e-3};
+    /// What is stiff for its mesh passes on what a contact does to all others; its rounds are cheap: see ShellFactor.
+    /// So does sheet metal that walls press, and no free body is thrown if it takes long.
+    static constexpr Care kAtLength{48, 1e-3};
     static constexpr Care kAmongWalls{6, 0.02};
     /// What a contact's point is moved by, along the normal, at the end of the step.
     struct Push {
@@ -193,6 +194,7 @@ class ContactResponse {
     double missing(const Contact& contact, int touch) const;
     Vec3 armAtEnd(const Contact& contact) const;
     void relaxDamping();
+    static void dropFriction(Touch& touch);
     void dropExcessFriction();
     double updateSticking(Touch& touch, double matters, double stiffness) const;
     double updateSliding(Touch& touch, double matters, double stiffness) const;
@@ -201,6 +203,7 @@ class ContactResponse {
     void updateCreeping(Touch& touch) const;
     bool creeps(const Touch& touch) const { return isQuick() && touch.slip.known && touch.slide.norm() <= m_creep; }
     double slowest() const { return 1e-3 * m_input.h * std::max(m_input.gravity.norm(), 1e-3); }
+    bool hasFreeBodies() const;
     bool isAmongWalls() const;
     bool isAnyStiff() const;
     double creepSpeed() const;
