@@ -580,6 +580,20 @@ void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelo
     }
 }
 
+/// What pulls at a wall has no friction either. Held by both it would come back and stick: what the friction held can
+/// lead into the wall by more than what pulled led out of it. Where there are rounds enough, the friction goes first:
+/// often it pulls because of that only.
+void ContactResponse::letGo(Touch& touch) const {
+    const bool hadFriction = touch.sticks || touch.slip.known;
+    if (!isQuick() && touch.dynamicBody < 0) {
+        dropFriction(touch);
+        if (hadFriction && m_care.rounds == kAtLength.rounds) return;
+    }
+    touch.active = false;
+    touch.lambda = 0.0;
+    ++touch.changes;
+}
+
 /// Where few rounds are made, later ones let go only what pulls by much.
 bool ContactResponse::releasePulling(int round) {
     constexpr double kMuch = 0.3;  // of the largest impulse
@@ -596,13 +610,8 @@ bool ContactResponse::releasePulling(int round) {
         const bool isStill = isWithoutBodies && touch.carried.isZero(0.0);
         const bool mayGo = touch.changes < kMostChanges - isStill && !(isStill && isLast(round + 1));
         if (touch.normalImpulse < -pull * most && !touch.jammed && mayGo) {
-            touch.active = false;
-            touch.lambda = 0.0;
-            ++touch.changes;
+            letGo(touch);
             changed = true;
-            // What pulls has no friction either. Held by both it would come back and stick: what the friction held can
-            // lead into the wall by more than what pulled led out of it.
-            if (!isQuick() && touch.dynamicBody < 0) dropFriction(touch);
         } else if (touch.isRow && !touch.isPinched && !isLater) {
             raiseMultiplier(touch);
         }

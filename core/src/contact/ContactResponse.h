@@ -179,6 +179,7 @@ class ContactResponse {
     double pinchedMass(const Touch& touch) const;
     double vertexStiffness(const CoupledSystem& system, const Touch& touch) const;
     void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);
+    void letGo(Touch& touch) const;
     bool releasePulling(int round);
     void raiseMultiplier(Touch& touch) const;
     double leavingSpeed(const Touch& touch) const;
