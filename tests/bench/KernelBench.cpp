@@ -72,12 +72,13 @@ void factorOrApply(benchmark::State& state, bool factorEach) {
     ShellAssembly assembly(sheet, designOf(sheet));
     const Points y = Points::Zero(3, sheet.vertexCount());
     const BlockMatrix& matrix = assembly.assemble(sheet, kStep, kGravity, nullptr, sheet.velocities(), y).matrix;
+    const FilteredMatrix filtered(matrix);
     IncompleteCholesky factor;
-    factor.factor(matrix, matrix.diagonal(), matrix.lower());
+    factor.factor(filtered);
     Points result(3, sheet.vertexCount());
     for (auto _ : state) {
         if (factorEach)
-            factor.factor(matrix, matrix.diagonal(), matrix.lower());
+            factor.factor(filtered);
         else
             factor.apply(sheet.positions().data(), result.data());
         benchmark::ClobberMemory();
@@ -93,8 +94,9 @@ void completeFactor(benchmark::State& state) {
     const Points y = Points::Zero(3, sheet.vertexCount());
     const BlockMatrix& matrix = assembly.assemble(sheet, kStep, kGravity, nullptr, sheet.velocities(), y).matrix;
     const std::vector<const Mat3*> free(sheet.vertexCount(), nullptr);
+    const FilteredMatrix filtered(matrix);
     ShellFactor factor;
-    for (auto _ : state) benchmark::DoNotOptimize(factor.factor(matrix, matrix.diagonal(), matrix.lower(), free));
+    for (auto _ : state) benchmark::DoNotOptimize(factor.factor(filtered, free));
     perVertex(state);
 }
 BENCHMARK(completeFactor)->Arg(13)->Arg(27)->Arg(35)->Arg(51)->Unit(benchmark::kMillisecond);
@@ -109,7 +111,8 @@ void compact(benchmark::State& state, Compact part) {
     const BlockMatrix& blocks = assembly.assemble(sheet, kStep, kGravity, nullptr, sheet.velocities(), y).matrix;
     CompactShell shell(blocks);
     shell.matrix.setValues(blocks);
-    shell.factor.factor(blocks.diagonal(), blocks.lower());
+    const FilteredMatrix filtered(blocks);
+    shell.factor.factor(filtered);
     CoarseSpace coarse(shell.matrix);
     const std::vector<const Mat3*> free(sheet.vertexCount(), nullptr);
     coarse.build(shell.matrix, sheet.positions(), free, {});
@@ -125,7 +128,7 @@ void compact(benchmark::State& state, Compact part) {
                 shell.matrix.multiply(x.data(), result.data());
                 break;
             case Compact::Factor:
-                shell.factor.factor(blocks.diagonal(), blocks.lower());
+                shell.factor.factor(filtered);
                 break;
             case Compact::Apply:
                 shell.factor.apply(x.data(), result.data());

@@ -212,7 +212,7 @@ TEST(CompactFactorTest, IsExactWithoutFill) {
     matrix.setPattern(30, tree);
     fillWithSprings(matrix, random, 3.0);
     CompactShell& compact = matrix.compact();
-    compact.factor.factor(matrix.diagonal(), matrix.lower());
+    compact.factor.factor(FilteredMatrix(matrix));
     EXPECT_EQ(compact.factor.shift(), 0.0);
     EXPECT_LT((inverseOf(compact.matrix, compact.factor) * dense(matrix) - Dense::Identity(90, 90)).norm(), 1e-4);
 }
@@ -230,9 +230,27 @@ TEST(CompactFactorTest, IsAPositivePreconditioner) {
     for (const double stiffness : {0.1, 1.0, 100.0}) {
         fillWithSprings(matrix, random, stiffness);
         CompactShell& compact = matrix.compact();
-        compact.factor.factor(matrix.diagonal(), matrix.lower());
+        compact.factor.factor(FilteredMatrix(matrix));
         expectPositive(inverseOf(compact.matrix, compact.factor));
     }
+}
+
+TEST(CompactFactorTest, IsThatOfTheAlteredMatrix) {
+    std::mt19937 random(8);
+    Pairs pairs;
+    for (int i = 1; i < 30; ++i) pairs.emplace_back(i / 2, i), pairs.emplace_back(i - 1, i);
+    BlockMatrix matrix, altered;
+    for (BlockMatrix* m : {&matrix, &altered}) m->setPattern(30, pairs);
+    fillWithSprings(matrix, random, 3.0);
+    altered.diagonal() = matrix.diagonal();
+    altered.lower() = matrix.lower();
+    FilteredMatrix filtered(matrix);
+    for (int i = 0; i < 30; i += 4) filtered.alterDiagonal(i) = altered.diagonal()[i] *= 2.0;
+    for (int k = 1; k < std::ssize(altered.lower()); k += 3) filtered.alterLower(k) = altered.lower()[k] *= 0.5;
+    matrix.compact().factor.factor(filtered);
+    altered.compact().factor.factor(FilteredMatrix(altered));
+    EXPECT_EQ(inverseOf(matrix.compact().matrix, matrix.compact().factor),
+              inverseOf(altered.compact().matrix, altered.compact().factor));
 }
 
 /// Kershaw's matrix: positive definite, but the factor on its own pattern has a negative pivot.
@@ -248,7 +266,7 @@ BlockMatrix kershaw() {
 TEST(CompactFactorTest, StaysPositiveWhereThePlainFactorBreaksDown) {
     const BlockMatrix matrix = kershaw();
     CompactShell& compact = matrix.compact();
-    compact.factor.factor(matrix.diagonal(), matrix.lower());
+    compact.factor.factor(FilteredMatrix(matrix));
     expectPositive(inverseOf(compact.matrix, compact.factor));
 }
 
@@ -256,10 +274,10 @@ TEST(CompactFactorTest, EndsOnIndefiniteAndOnNonFiniteMatrices) {
     BlockMatrix matrix = kershaw();
     matrix.diagonal()[2] = -Mat3::Identity();
     CompactShell& compact = matrix.compact();
-    compact.factor.factor(matrix.diagonal(), matrix.lower());
+    compact.factor.factor(FilteredMatrix(matrix));
     expectPositive(inverseOf(compact.matrix, compact.factor));
     matrix.diagonal()[1].setConstant(std::numeric_limits<double>::quiet_NaN());
-    compact.factor.factor(matrix.diagonal(), matrix.lower());  // only has to return
+    compact.factor.factor(FilteredMatrix(matrix));  // only has to return
 }
 
 /// S x of every vertex with a projector.

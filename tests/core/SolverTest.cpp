@@ -236,6 +236,27 @@ TEST(StepSystemTest, AlterationIsAForceOfTheUndampedStiffness) {
     assembly.expectEqual();
 }
 
+TEST(FilteredMatrixTest, CopiesWhatIsAlteredAlone) {
+    std::mt19937 random(4);
+    BlockMatrix matrix;
+    matrix.setPattern(25, randomPairs(random, 25, 80));
+    fillWithSprings(matrix, random, 3.0);
+    const std::vector<Mat3> diagonal = matrix.diagonal(), lower = matrix.lower();
+    FilteredMatrix filtered(matrix);
+    for (int i = 0; i < 25; i += 3) filtered.alterDiagonal(i) *= 2.0;
+    for (int k = 0; k < std::ssize(lower); k += 5) filtered.alterLower(k) *= 3.0;
+    filtered.alterLower(5) *= 2.0;  // once more
+    for (int i = 0; i < 25; ++i) EXPECT_EQ(filtered.diagonal(i), (i % 3 ? 1.0 : 2.0) * diagonal[i]);
+    for (int k = 0; k < std::ssize(lower); ++k)
+        EXPECT_EQ(filtered.lower(k), (k % 5 ? 1.0 : k == 5 ? 6.0 : 3.0) * lower[k]);
+    EXPECT_EQ(filtered.alteredCount(), 9 + (lower.size() + 4) / 5);
+    EXPECT_TRUE(matrix.diagonal() == diagonal);
+    EXPECT_TRUE(matrix.lower() == lower);
+    filtered.begin(matrix);
+    EXPECT_EQ(filtered.diagonal(3), diagonal[3]);
+    EXPECT_EQ(filtered.alteredCount(), 0u);
+}
+
 /// The operator that `factor` applies.
 Dense inverseOf(const IncompleteCholesky& factor, int size) {
     Dense result(3 * size, 3 * size);
@@ -263,7 +284,7 @@ TEST(IncompleteCholeskyTest, IsExactWithoutFill) {
     matrix.setPattern(30, chain);
     fillWithSprings(matrix, random, 3.0);
     IncompleteCholesky factor;
-    factor.factor(matrix, matrix.diagonal(), matrix.lower());
+    factor.factor(FilteredMatrix(matrix));
     EXPECT_EQ(factor.shift(), 0.0);
     EXPECT_LT((inverseOf(factor, 30) * dense(matrix) - Dense::Identity(90, 90)).norm(), 1e-11);
 }
@@ -275,7 +296,7 @@ TEST(IncompleteCholeskyTest, IsAPositivePreconditioner) {
     for (const double stiffness : {0.1, 1.0, 100.0}) {
         fillWithSprings(matrix, random, stiffness);
         IncompleteCholesky factor;
-        factor.factor(matrix, matrix.diagonal(), matrix.lower());
+        factor.factor(FilteredMatrix(matrix));
         expectPositive(inverseOf(factor, 25));
     }
 }
@@ -294,7 +315,7 @@ TEST(IncompleteCholeskyTest, ShiftsWhereThePlainFactorBreaksDown) {
     const BlockMatrix matrix = kershaw();
     expectPositive(dense(matrix));
     IncompleteCholesky factor;
-    factor.factor(matrix, matrix.diagonal(), matrix.lower());
+    factor.factor(FilteredMatrix(matrix));
     EXPECT_GT(factor.shift(), 0.0);
     expectPositive(inverseOf(factor, 4));
 }
@@ -302,12 +323,12 @@ TEST(IncompleteCholeskyTest, ShiftsWhereThePlainFactorBreaksDown) {
 TEST(IncompleteCholeskyTest, ForgetsTheShiftWhenTheBreakdownIsOver) {
     BlockMatrix matrix = kershaw();
     IncompleteCholesky factor;
-    factor.factor(matrix, matrix.diagonal(), matrix.lower());
+    factor.factor(FilteredMatrix(matrix));
     const double needed = factor.shift();
-    factor.factor(matrix, matrix.diagonal(), matrix.lower());
+    factor.factor(FilteredMatrix(matrix));
     EXPECT_LE(factor.shift(), 2.0 * needed);  // does not pile up
     for (Mat3& block : matrix.lower()) block *= 0.1;
-    for (int i = 0; i < 40; ++i) factor.factor(matrix, matrix.diagonal(), matrix.lower());
+    for (int i = 0; i < 40; ++i) factor.factor(FilteredMatrix(matrix));
     EXPECT_EQ(factor.shift(), 0.0);
 }
 
@@ -315,10 +336,10 @@ TEST(IncompleteCholeskyTest, EndsOnIndefiniteAndOnNonFiniteMatrices) {
     BlockMatrix matrix = kershaw();
     matrix.diagonal()[2] = -Mat3::Identity();
     IncompleteCholesky factor;
-    factor.factor(matrix, matrix.diagonal(), matrix.lower());
+    factor.factor(FilteredMatrix(matrix));
     expectPositive(inverseOf(factor, 4));
     matrix.diagonal()[1].setConstant(std::numeric_limits<double>::quiet_NaN());
-    factor.factor(matrix, matrix.diagonal(), matrix.lower());  // only has to return
+    factor.factor(FilteredMatrix(matrix));  // only has to return
 }
 
 /// Shells of random matrices, random bodies, and what is asked of them.

@@ -12,11 +12,17 @@ namespace {
 /// What a factor is made of, as plain memory for the kernels. Blocks are nine numbers by columns.
 struct Factoring {
     const int *vertexOf, *rowStart, *column, *source, *pairStart, *pairs, *upperOf;
-    const double *diagonal, *values;
+    FilteredMatrix::Blocks diagonal, values;
     double *inverse, *scaled;
     float *root, *rootTransposed, *lower, *upper;
     double shift;
 };
+
+JACKET_INLINE const double* blockAt(const FilteredMatrix::Blocks& blocks, int k) {
+    const int place = blocks.place[k];
+    return place < 0 ? blocks.own + 9 * static_cast<std::size_t>(k)
+                     : blocks.altered + 9 * static_cast<std::size_t>(place);
+}
 
 /// By columns in the first three places; the last of each is anything. Loads and stores of four numbers stay within the
 /// nine: pieces of two and one would wait for each other in memory.
@@ -87,10 +93,10 @@ JACKET_INLINE void storeRoot(const Triangular& t, float* root, float* rootTransp
 
 /// What a row will read that is not where the last rows read.
 JACKET_INLINE void prefetchRow(const Factoring& f, int row) {
-    __builtin_prefetch(f.diagonal + 9 * static_cast<std::size_t>(f.vertexOf[row]));
+    __builtin_prefetch(blockAt(f.diagonal, f.vertexOf[row]));
     for (int k = f.rowStart[row]; k < f.rowStart[row + 1]; ++k) {
         const int source = f.source[k];
-        const double* const values = f.values + 9 * static_cast<std::size_t>(source >= 0 ? source : ~source);
+        const double* const values = blockAt(f.values, source >= 0 ? source : ~source);
         __builtin_prefetch(values);
         __builtin_prefetch(values + 8);
     }
@@ -105,13 +111,13 @@ JACKET_KERNEL bool factorKernel(const Factoring& factoring, int begin, int end, 
     for (int i = begin; i < end; ++i) {
         if (i + kRowsAhead < end) prefetchRow(f, i + kRowsAhead);
         Double4 d[3] = {};
-        loadBlock(f.diagonal + 9 * static_cast<std::size_t>(f.vertexOf[i]), d);
+        loadBlock(blockAt(f.diagonal, f.vertexOf[i]), d);
         const Triangular before = triangular(d);
         for (Double4& column : d) column *= 1.0 + f.shift;
         for (int k = f.rowStart[i]; k < f.rowStart[i + 1]; ++k) {
             Double4 block[3] = {}, left[3] = {};
             const bool isLower = f.source[k] >= 0;
-            loadBlock(f.values + 9 * static_cast<std::size_t>(isLower ? f.source[k] : ~f.source[k]), block);
+            loadBlock(blockAt(f.values, isLower ? f.source[k] : ~f.source[k]), block);
             if (!isLower) transpose(block);
             for (int pair = f.pairStart[k]; pair < f.pairStart[k + 1]; ++pair) {
                 loadBlock(row + 9 * (f.pairs[2 * pair] - f.rowStart[i]), left);
@@ -197,26 +203,14 @@ CompactFactor::CompactFactor(const CompactMatrix& matrix)
     for (auto* perBlock : {&m_lower, &m_upper}) perBlock->assign(9 * m_column.size() + 3, 0.0f);
 }
 
-void CompactFactor::factor(const std::vector<Mat3>& diagonal, const std::vector<Mat3>& lower, WorkerTeam* team) {
+void CompactFactor::factor(const FilteredMatrix& matrix, WorkerTeam* team) {
     constexpr double kMostShift = 1e3;  // as good as block Jacobi; keeps the loop finite on garbage
     m_shift *= 0.9;  // let it shrink again when the breakdown is over; a factor cares little for its size
     if (m_shift < 1e-3) m_shift = 0.0;
-    Factoring f{m_vertexOf.data(),
-                m_rowStart.data(),
-                m_column.data(),
-                m_source.data(),
-                m_pairStart.data(),
-                m_pairs.data(),
-                m_upperOf.data(),
-                diagonal.data()->data(),
-                lower.empty() ? nullptr : lower.data()->data(),
-                m_inverse.data(),
-                m_scaled.data(),
-                m_root.data(),
-                m_rootTransposed.data(),
-                m_lower.data(),
-                m_upper.data(),
-                m_shift};
+    Factoring f{m_vertexOf.data(),       m_rowStart.data(), m_column.data(),  m_source.data(),
+                m_pairStart.data(),      m_pairs.data(),    m_upperOf.data(), matrix.diagonalBlocks(),
+                matrix.lowerBlocks(),    m_inverse.data(),  m_scaled.data(),  m_root.data(),
+                m_rootTransposed.data(), m_lower.data(),    m_upper.data(),   m_shift};
     const int strips = stripCount();
     const auto factorParts = [&](int first, int count) {
         std::atomic<bool> works = true;
@@ -229,13 +223,13 @@ void CompactFactor::factor(const std::vector<Mat3>& diagonal, const std::vector<
     while (!factorParts(0, strips) || !factorParts(strips, strips - 1)) {
         m_shift = std::max(2.0 * m_shift, 5e-3);
         f.shift = m_shift;
-        if (m_shift > kMostShift) return factorDiagonally(diagonal);
+        if (m_shift > kMostShift) return factorDiagonally(matrix);
     }
 }
 
-void CompactFactor::factorDiagonally(const std::vector<Mat3>& diagonal) {
+void CompactFactor::factorDiagonally(const FilteredMatrix& matrix) {
     for (int row = 0; row < m_size; ++row) {
-        const double mean = std::max(diagonal[m_vertexOf[row]].trace() / 3.0, 1e-30);
+        const double mean = std::max(matrix.diagonal(m_vertexOf[row]).trace() / 3.0, 1e-30);
         for (auto* root : {&m_root, &m_rootTransposed})
             Eigen::Map<Eigen::Matrix3f>(root->data() + 9 * row) =
                 Eigen::Matrix3f::Identity() * static_cast<float>(1.0 / std::sqrt(mean));

@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "solver/CompactMatrix.h"
+#include "solver/FilteredMatrix.h"
 
 namespace jacket {
 
@@ -10,8 +11,8 @@ class CompactFactor {
   public:
     /// Takes the pattern.
     explicit CompactFactor(const CompactMatrix& matrix);
-    /// `diagonal` and `lower` are the values, in the order of the block matrix that the pattern came from.
-    void factor(const std::vector<Mat3>& diagonal, const std::vector<Mat3>& lower, WorkerTeam* team = nullptr);
+    /// `matrix`: of the block matrix that the pattern came from.
+    void factor(const FilteredMatrix& matrix, WorkerTeam* team = nullptr);
     /// z = (L D L^T)^-1 r, four floats a row; the last of each is 0 in z. r and z may be the same.
     void apply(const float* r, float* z) const;
     /// The same in parts: forward for every strip, then every separator, then backward for every strip (see
@@ -30,7 +31,7 @@ class CompactFactor {
 
   private:
     Solving solving() const;
-    void factorDiagonally(const std::vector<Mat3>& diagonal);
+    void factorDiagonally(const FilteredMatrix& matrix);
     int m_size;
     std::vector<int> m_partStart;  ///< see CompactMatrix::partStarts
     std::vector<int> m_vertexOf;   ///< of each row

@@ -20,37 +20,33 @@ void CoupledPreconditioner::build(const CoupledSystem& system, Preconditioner ki
 void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t shell, Preconditioner kind,
                                        bool keepsCoarse) {
     const auto& part = system.shells()[shell];
-    m_diagonal = part.matrix->diagonal();
-    if (kind == Preconditioner::IncompleteCholesky)
-        m_lower = part.matrix->lower();
-    else
-        m_lower.clear();
+    m_filtered.begin(*part.matrix, kind == Preconditioner::BlockJacobi);
     addRows(system, part);
     filterBlocks(system, part);
     if (system.precision() == Precision::Double && factorCompletely(system, shell)) return;
     if (isCompact(system, shell)) {
         CompactShell& compact = part.matrix->compact();
-        compact.factor.factor(m_diagonal, m_lower, system.team());
+        compact.factor.factor(m_filtered, system.team());
         if (!keepsCoarse || !compact.coarse || !knowsContacts(system, part, *compact.coarse)) buildCoarse(system, part);
         return;
     }
     if (kind == Preconditioner::IncompleteCholesky) {
-        m_factors[shell].factor(*part.matrix, m_diagonal, m_lower);
+        m_factors[shell].factor(m_filtered);
     } else {
-        m_inverseBlocks[shell].resize(m_diagonal.size());
-        for (std::size_t i = 0; i < m_diagonal.size(); ++i) m_inverseBlocks[shell][i] = m_diagonal[i].inverse();
+        m_inverseBlocks[shell].resize(part.matrix->diagonal().size());
+        for (int i = 0; i < part.matrix->size(); ++i) m_inverseBlocks[shell][i] = m_filtered.diagonal(i).inverse();
     }
 }
 
 bool CoupledPreconditioner::factorCompletely(const CoupledSystem& system, std::size_t shell) {
     const auto& part = system.shells()[shell];
-    if (!part.isFactored || m_lower.empty()) {
+    if (!part.isFactored || !m_filtered.hasLower()) {
         m_complete[shell].reset();
         return false;
     }
     if (!m_complete[shell]) m_complete[shell] = std::make_unique<ShellFactor>();
     findFree(system, part);
-    if (m_complete[shell]->factor(*part.matrix, m_diagonal, m_lower, m_free)) return true;
+    if (m_complete[shell]->factor(m_filtered, m_free)) return true;
     m_complete[shell].reset();
     return false;
 }
@@ -107,11 +103,11 @@ void CoupledPreconditioner::addRows(const CoupledSystem& system, const CoupledSy
         for (int a = 0; a < 3; ++a) {
             if (row.weights[a] == 0.0) continue;
             const int i = row.vertices[a] - part.offset;
-            m_diagonal[i] += row.weights[a] * row.weights[a] * row.stiffness;
-            for (int b = 0; b < 3 && !m_lower.empty(); ++b) {
+            m_filtered.alterDiagonal(i) += row.weights[a] * row.weights[a] * row.stiffness;
+            for (int b = 0; b < 3 && m_filtered.hasLower(); ++b) {
                 const int j = row.vertices[b] - part.offset;
                 if (j < i && row.weights[b] != 0.0)
-                    m_lower[part.matrix->slot(i, j)] += row.weights[a] * row.weights[b] * row.stiffness;
+                    m_filtered.alterLower(part.matrix->slot(i, j)) += row.weights[a] * row.weights[b] * row.stiffness;
             }
         }
     }
@@ -122,15 +118,18 @@ void CoupledPreconditioner::filterBlocks(const CoupledSystem& system, const Coup
     for (int i = 0; i < part.matrix->size(); ++i) {
         const VertexConstraint* ci = free(i);
         if (ci) {
-            const double scale = m_diagonal[i].trace() / 3.0;
-            const Mat3 filtered = ci->free * m_diagonal[i] * ci->free;
-            m_diagonal[i] = filtered + scale * (Mat3::Identity() - ci->free);
+            Mat3& block = m_filtered.alterDiagonal(i);
+            const double scale = block.trace() / 3.0;
+            const Mat3 filtered = ci->free * block * ci->free;
+            block = filtered + scale * (Mat3::Identity() - ci->free);
         }
-        if (m_lower.empty()) continue;
+        if (!m_filtered.hasLower()) continue;
         for (int k = part.matrix->rowBegin(i); k < part.matrix->rowEnd(i); ++k) {
             const VertexConstraint* cj = free(part.matrix->column(k));
-            if (ci) m_lower[k] = (ci->free * m_lower[k]).eval();
-            if (cj) m_lower[k] = (m_lower[k] * cj->free).eval();
+            if (!ci && !cj) continue;
+            Mat3& block = m_filtered.alterLower(k);
+            if (ci) block = (ci->free * block).eval();
+            if (cj) block = (block * cj->free).eval();
         }
     }
 }

@@ -6,6 +6,7 @@
 #include "jacket/Shell.h"
 #include "solver/CoarseSpace.h"
 #include "solver/CoupledSystem.h"
+#include "solver/FilteredMatrix.h"
 #include "solver/IncompleteCholesky.h"
 #include "solver/ShellFactor.h"
 
@@ -63,7 +64,7 @@ class CoupledPreconditioner {
     BodyGroup& takeGroup(std::size_t size);
     void factorGroup(const CoupledSystem& system, int first, std::size_t size);
 
-    std::vector<Mat3> m_diagonal, m_lower;             ///< scratch: filtered copy of one shell's matrix
+    FilteredMatrix m_filtered;                         ///< scratch: of one shell
     std::vector<const Mat3*> m_free;                   ///< scratch
     std::vector<CoarseSpace::Tie> m_ties;              ///< scratch
     mutable std::vector<float> m_rounded, m_roundedZ;  ///< scratch: a shell's r and z, four floats a row

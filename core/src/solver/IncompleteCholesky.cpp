@@ -23,36 +23,36 @@ bool invertPositive(const Mat3& a, double scale, Mat3& inverse) {
 
 }  // namespace
 
-void IncompleteCholesky::factor(const BlockMatrix& matrix, const std::vector<Mat3>& diagonal,
-                                const std::vector<Mat3>& lower) {
-    m_pattern = &matrix;
-    m_inverse.resize(diagonal.size());
-    m_lower.resize(lower.size());
-    if (m_scratch.cols() != matrix.size()) m_scratch.resize(3, matrix.size());
+void IncompleteCholesky::factor(const FilteredMatrix& matrix) {
+    m_pattern = &matrix.pattern();
+    m_inverse.resize(m_pattern->diagonal().size());
+    m_lower.resize(m_pattern->lower().size());
+    if (m_scratch.cols() != m_pattern->size()) m_scratch.resize(3, m_pattern->size());
     m_shift *= 0.7;  // let it shrink again when the breakdown is over
     if (m_shift < 1e-3) m_shift = 0.0;
-    while (!tryFactor(matrix, diagonal, lower)) m_shift = std::max(2.0 * m_shift, 5e-3);
+    while (!tryFactor(matrix)) m_shift = std::max(2.0 * m_shift, 5e-3);
 }
 
-bool IncompleteCholesky::tryFactor(const BlockMatrix& matrix, const std::vector<Mat3>& diagonal,
-                                   const std::vector<Mat3>& lower) {
+bool IncompleteCholesky::tryFactor(const FilteredMatrix& matrix) {
+    const BlockMatrix& pattern = *m_pattern;
     if (m_shift > 1e3) {  // as good as block Jacobi; keeps the loop finite on garbage
-        for (std::size_t i = 0; i < diagonal.size(); ++i)
-            m_inverse[i] = Mat3::Identity() / std::max(diagonal[i].trace() / 3.0, 1e-300);
+        for (int i = 0; i < pattern.size(); ++i)
+            m_inverse[i] = Mat3::Identity() / std::max(matrix.diagonal(i).trace() / 3.0, 1e-300);
         std::fill(m_lower.begin(), m_lower.end(), Mat3::Zero());
         m_shift = 0.0;
         return true;
     }
-    for (int i = 0; i < matrix.size(); ++i) {
-        Mat3 d = (1.0 + m_shift) * diagonal[i];
-        const double scale = std::min({diagonal[i](0, 0), diagonal[i](1, 1), diagonal[i](2, 2)});
-        for (int k = matrix.rowBegin(i); k < matrix.rowEnd(i); ++k) {
-            const int j = matrix.column(k);
-            Mat3 block = lower[k];
-            int p = matrix.rowBegin(i), q = matrix.rowBegin(j);
-            const int qEnd = matrix.rowEnd(j);
+    for (int i = 0; i < pattern.size(); ++i) {
+        const Mat3& diagonal = matrix.diagonal(i);
+        Mat3 d = (1.0 + m_shift) * diagonal;
+        const double scale = std::min({diagonal(0, 0), diagonal(1, 1), diagonal(2, 2)});
+        for (int k = pattern.rowBegin(i); k < pattern.rowEnd(i); ++k) {
+            const int j = pattern.column(k);
+            Mat3 block = matrix.lower(k);
+            int p = pattern.rowBegin(i), q = pattern.rowBegin(j);
+            const int qEnd = pattern.rowEnd(j);
             while (p < k && q < qEnd) {  // columns that rows i and j share
-                const int cp = matrix.column(p), cq = matrix.column(q);
+                const int cp = pattern.column(p), cq = pattern.column(q);
                 if (cp == cq) {
                     block.noalias() -= m_lower[p] * (m_inverse[cp] * m_lower[q].transpose());
                     ++p, ++q;

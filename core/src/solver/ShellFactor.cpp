@@ -110,12 +110,12 @@ void ShellFactor::add(int place, const Mat3& block) {
         Part(values + ~place) += block.transpose();
 }
 
-bool ShellFactor::factor(const BlockMatrix& matrix, const std::vector<Mat3>& diagonal, const std::vector<Mat3>& lower,
-                         const std::vector<const Mat3*>& free) {
+bool ShellFactor::factor(const FilteredMatrix& filtered, const std::vector<const Mat3*>& free) {
+    const BlockMatrix& matrix = filtered.pattern();
     if (!isOf(matrix)) analyse(matrix);
     m_factor->setZero();
-    for (int i = 0; i < matrix.size(); ++i) add(placeOf(i, i), diagonal[i]);
-    for (std::size_t k = 0; k < lower.size(); ++k) add(m_lowerPlace[k], lower[k]);
+    for (int i = 0; i < matrix.size(); ++i) add(placeOf(i, i), filtered.diagonal(i));
+    for (std::size_t k = 0; k < m_lowerPlace.size(); ++k) add(m_lowerPlace[k], filtered.lower(static_cast<int>(k)));
     auto place = m_besidePlace.begin();
     forBeside(matrix, [&](int i, int j, double value) {
         Mat3 block = matrix.besideFactor() * value * Mat3::Identity();

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "solver/BlockFactor.h"
-#include "solver/BlockMatrix.h"
+#include "solver/FilteredMatrix.h"
 
 namespace jacket {
 
@@ -12,10 +12,9 @@ namespace jacket {
 /// Vertices are eliminated two at a time: blocks of six rows keep a processor busy.
 class ShellFactor {
   public:
-    /// `diagonal` and `lower` are the filtered values, on the pattern of `matrix`; `free`: of each vertex the projector
-    /// that filters what stands beside, null: the identity. False if the values are not positive definite.
-    bool factor(const BlockMatrix& matrix, const std::vector<Mat3>& diagonal, const std::vector<Mat3>& lower,
-                const std::vector<const Mat3*>& free);
+    /// `free`: of each vertex the projector that filters what stands beside the blocks, null: the identity. False if
+    /// the filtered matrix is not positive definite.
+    bool factor(const FilteredMatrix& filtered, const std::vector<const Mat3*>& free);
     /// z = A^-1 r over size() columns of 3 doubles. They may be the same.
     void apply(const double* r, double* z) const;
 
