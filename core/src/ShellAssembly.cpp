@@ -47,31 +47,7 @@ ShellAssembly::ShellAssembly(const Shell& shell, const ShellDesign& design)
     for (int t = 0; t < shell.mesh().triangleCount(); ++t)
         m_triangleSlots.push_back(stencilSlots<3>(m_system.matrix, cornersOf(shell, t)));
     for (const auto& energy : m_energies)
-        if (const ConstantHessian* constant = energy->constantHessian()) splitConstant(*constant);
-}
-
-/// At most one energy has a constant Hessian.
-void ShellAssembly::splitConstant(const ConstantHessian& hessian) {
-    const BlockMatrix& matrix = m_system.matrix;
-    ConstantPart& split = m_constant.emplace();
-    split.lower.assign(matrix.lower().size(), 0.0);
-    split.diagonal = hessian.diagonal();
-    ConstantHessian& beside = split.beside;
-    beside.resize(hessian.rows(), hessian.cols());
-    beside.reserve(hessian.nonZeros());
-    for (int row = 0; row < hessian.rows(); ++row) {
-        beside.startVec(row);
-        for (ConstantHessian::InnerIterator it(hessian, row); it; ++it) {
-            const int column = static_cast<int>(it.col());
-            if (row == column) continue;
-            if (!matrix.contains(std::max(row, column), std::min(row, column)))
-                beside.insertBack(row, column) = it.value();
-            else if (row > column)
-                split.lower[matrix.slot(row, column)] = it.value();
-        }
-    }
-    beside.finalize();
-    beside.data().squeeze();
+        if (energy->constantHessian()) m_constant = energy->constantHessian();
 }
 
 void ShellAssembly::addEnergies(const Points& x, HessianKind kind) {
@@ -93,7 +69,7 @@ PlasticFlow ShellAssembly::flow(const Points& x) {
 const StepSystem& ShellAssembly::assembleStatic(const Shell& shell, const Vec3& gravity, double load,
                                                 HessianKind kind) {
     m_system.setTeam(nullptr);
-    m_system.begin(1.0, 0.0, constant());  // a step of 1 s without mass: A = K, b = f
+    m_system.begin(1.0, 0.0, m_constant);  // a step of 1 s without mass: A = K, b = f
     addEnergies(shell.positions(), kind);
     addLoads(shell, gravity, load);
     if (kind == HessianKind::Exact && shell.pressure() != 0.0) addPressureStiffness(shell, load * shell.pressure());
@@ -123,7 +99,7 @@ const StepSystem& ShellAssembly::assemble(const Shell& shell, double h, const Ve
                                           const Eigen::Ref<const Points>* ahead, WorkerTeam* team) {
     m_system.setTeam(team);
     if (ahead) m_end = shell.positions() + h * *ahead + y;
-    m_system.begin(h, shell.material().stiffnessDamping, constant());       // A = (h^2 + h beta) K_constant, b = 0
+    m_system.begin(h, shell.material().stiffnessDamping, m_constant);       // A = (h^2 + h beta) K_constant, b = 0
     addEnergies(ahead ? m_end : shell.positions(), HessianKind::Positive);  // A += (h^2 + h beta) K, b += h f
     if (ahead)
         m_system.addAlteration(*ahead, -h);  // b += h^2 K v', linearised at the end

@@ -1,6 +1,5 @@
 #pragma once
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "energy/makeEnergies.h"
@@ -37,15 +36,13 @@ class ShellAssembly {
 
   private:
     void addPressureStiffness(const Shell& shell, double pressure);
-    void splitConstant(const ConstantHessian& hessian);
-    const ConstantPart* constant() const { return m_constant ? &*m_constant : nullptr; }
     void addEnergies(const Points& x, HessianKind kind);
     void addLoads(const Shell& shell, const Vec3& gravity, double load);
     void addWind(const Shell& shell, const Wind& wind);
     std::vector<std::unique_ptr<Energy>> m_energies;  ///< membrane, then bending
     StepSystem m_system;
-    std::optional<ConstantPart> m_constant;
-    Points m_end;  ///< where `ahead` leads
+    const ConstantHessian* m_constant = nullptr;  ///< of one of them, at most
+    Points m_end;                                 ///< where `ahead` leads
     std::vector<std::array<int, 3>> m_triangleSlots;
 };
 

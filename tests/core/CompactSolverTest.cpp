@@ -113,9 +113,13 @@ TEST(CompactMatrixTest, TakesWhatStandsBesideOnceAndLetsItGo) {
     matrix.setPattern(4, {{0, 1}, {1, 2}, {2, 3}});
     matrix.setZero();
     for (Mat3& block : matrix.diagonal()) block.setIdentity();
-    ConstantHessian scalars(4, 4);
-    const std::vector<Eigen::Triplet<double>> entries{{0, 2, 0.5}, {2, 0, 0.5}, {3, 0, -2.0}, {0, 3, -2.0}};
-    scalars.setFromTriplets(entries.begin(), entries.end());
+    ConstantHessian scalars;
+    const Pairs rows[] = {{{2, 1}, {3, -4}}, {}, {{0, 1}}, {{0, -4}}};  // columns, and twice the scalars
+    for (const Pairs& row : rows) {
+        for (const auto& [column, twice] : row) scalars.append(column, 0.5 * twice);
+        scalars.endRow();
+    }
+    scalars.split(matrix);
     CompactMatrix compact(matrix);
     std::mt19937 random(2);
     const Points x = randomPoints(random, 4);

@@ -81,9 +81,11 @@ struct Sheet {
                 dense.block<3, 3>(3 * m.column(k), 3 * i) += m.lower()[k].transpose();
             }
         }
-        const Eigen::MatrixXd q = *energy.constantHessian();
-        for (int i = 0; i < n; ++i)
-            for (int j = 0; j < n; ++j) dense.block<3, 3>(3 * i, 3 * j).diagonal().array() += q(i, j);
+        const ConstantHessian& q = *energy.constantHessian();
+        for (const auto& scalars : {q.inside(), q.beside()})
+            for (int i = 0; i < n; ++i)
+                for (int k = scalars.start[i]; k < scalars.start[i + 1]; ++k)
+                    dense.block<3, 3>(3 * i, 3 * scalars.column[k]).diagonal().array() += scalars.value[k];
         return dense;
     }
 };

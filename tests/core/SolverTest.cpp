@@ -223,6 +223,31 @@ TEST(StepSystemTest, DampingDragAndMassEqualDense) {
     assembly.expectEqual();
 }
 
+TEST(StepSystemTest, TakesAConstantHessianIntoItsBlocksAndBesideThem) {
+    constexpr int kSize = 20;
+    const double h = Assembly::kStep;
+    std::mt19937 random(9);
+    Dense dense = Dense::Identity(kSize, kSize);
+    for (const auto& [i, j] : randomPairs(random, kSize, 80)) dense(i, j) = dense(j, i) = 0.1 * (i + j + 1);
+    ConstantHessian scalars;
+    for (int i = 0; i < kSize; ++i) {
+        for (int j = 0; j < kSize; ++j)
+            if (dense(i, j) != 0.0) scalars.append(j, dense(i, j));
+        scalars.endRow();
+    }
+    StepSystem system;
+    system.matrix.setPattern(kSize, randomPairs(random, kSize, 60));
+    scalars.split(system.matrix);
+    EXPECT_GT(scalars.besideCount(), 0u);
+    EXPECT_LT(static_cast<Eigen::Index>(scalars.besideCount()), (dense.array() != 0.0).count() - kSize);
+    system.begin(h, Assembly::kBeta, &scalars);
+    const Points x = randomPoints(random, kSize);
+    Points y(3, kSize);
+    system.matrix.multiply(x.data(), y.data());
+    const Dense expected = (h * h + h * Assembly::kBeta) * x * dense;
+    EXPECT_LT((y - expected).norm(), 1e-14 * expected.norm());
+}
+
 TEST(StepSystemTest, AlterationIsAForceOfTheUndampedStiffness) {
     Assembly assembly(5);
     for (int i = 0; i < 10; ++i) assembly.addEnergy<4>();

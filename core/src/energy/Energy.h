@@ -40,7 +40,8 @@ class Energy {
     virtual ~Energy() = default;
     virtual void collectPairs(std::vector<std::pair<int, int>>& pairs) const = 0;  ///< vertex pairs it couples
     virtual void bind(const BlockMatrix& matrix) = 0;                              ///< looks up its blocks, once
-    /// The part of the Hessian that never changes and is a scalar per vertex pair; addTo leaves it out.
+    /// The part of the Hessian that never changes and is a scalar per vertex pair; addTo leaves it out. From bind on it
+    /// is split for that matrix. At most one energy of a shell has one.
     virtual const ConstantHessian* constantHessian() const { return nullptr; }
     virtual void addTo(StepSystem& system, const Points& x, HessianKind kind) const = 0;  ///< A and b at x
     virtual double value(const Points& x) const = 0;                                      ///< [J]

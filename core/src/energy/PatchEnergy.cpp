@@ -27,22 +27,33 @@ double norm(const Vec3& k) {  // of a symmetric tensor given as uu, vv, uv
     return std::sqrt(k[0] * k[0] + k[1] * k[1] + 2.0 * k[2] * k[2]);
 }
 
-/// A matrix of scalars by rows, and positions in fours.
+/// A matrix of scalars, and positions in fours.
 struct ConstantRows {
-    const int *start, *column;
-    const double *value, *x;
+    ConstantHessian::Rows inside, beside;
+    const double* x;
     int count;
 };
 
-/// Row i of the matrix times the positions. Its sum is zero, so differences to x_i do: they lose no digits far from the
-/// origin.
+using Scalars = ConstantHessian::Rows;
+
+JACKET_INLINE void addDifference(const Scalars& scalars, int k, const double* x, const double* xi, double (&sum)[4]) {
+    const double* const xj = x + 4 * scalars.column[k];
+    for (int c = 0; c < 4; ++c) sum[c] += scalars.value[k] * (xj[c] - xi[c]);
+}
+
+/// Row i of the matrix times the positions, by rising columns. Its sum is zero, so differences to x_i do: they lose no
+/// digits far from the origin.
 JACKET_INLINE void multiplyRow(const ConstantRows& rows, int i, double (&sum)[4]) {
-    const double* const xi = rows.x + 4 * i;
+    const Scalars &inside = rows.inside, &beside = rows.beside;
+    const double *const x = rows.x, *const xi = x + 4 * i;
     for (double& s : sum) s = 0.0;
-    for (int k = rows.start[i]; k < rows.start[i + 1]; ++k) {
-        const double* const xj = rows.x + 4 * rows.column[k];
-        for (int c = 0; c < 4; ++c) sum[c] += rows.value[k] * (xj[c] - xi[c]);
+    int b = beside.start[i];
+    const int end = beside.start[i + 1];
+    for (int k = inside.start[i]; k < inside.start[i + 1]; ++k) {
+        for (; b < end && beside.column[b] < inside.column[k]; ++b) addDifference(beside, b, x, xi, sum);
+        addDifference(inside, k, x, xi, sum);
     }
+    for (; b < end; ++b) addDifference(beside, b, x, xi, sum);
 }
 
 /// to += factor K x for rows begin to end - 1, by three numbers a vertex.
@@ -54,20 +65,32 @@ JACKET_KERNEL void addConstantGradient(const ConstantRows& rows, int begin, int 
     }
 }
 
-JACKET_INLINE void loadPosition(const ConstantRows& rows, int i, Double4& to) {
-    std::memcpy(&to, rows.x + 4 * static_cast<std::size_t>(i), sizeof(to));
+JACKET_INLINE void loadPosition(const double* x, int i, Double4& to) {
+    std::memcpy(&to, x + 4 * static_cast<std::size_t>(i), sizeof(to));
+}
+
+JACKET_INLINE void subtractSquare(const Scalars& scalars, int k, const double* x, const Double4& xi, Double4& sum) {
+    Double4 xj;
+    loadPosition(x, scalars.column[k], xj);
+    sum -= scalars.value[k] * ((xj - xi) * (xj - xi));
 }
 
 /// x . K x = -sum_{i<j} K_ij |x_j - x_i|^2, for the same reason.
 JACKET_KERNEL double constantProduct(const ConstantRows& rows) {
+    const Scalars &inside = rows.inside, &beside = rows.beside;
+    const double* const x = rows.x;
     Double4 sum{};
     for (int i = 0; i < rows.count; ++i) {
-        Double4 xi, xj;
-        loadPosition(rows, i, xi);
-        for (int k = rows.start[i + 1] - 1; k >= rows.start[i] && rows.column[k] > i; --k) {
-            loadPosition(rows, rows.column[k], xj);
-            sum -= rows.value[k] * ((xj - xi) * (xj - xi));
+        Double4 xi;
+        loadPosition(x, i, xi);
+        int b = beside.start[i + 1] - 1;
+        const int first = beside.start[i];
+        for (int k = inside.start[i + 1] - 1; k >= inside.start[i] && inside.column[k] > i;
+             --k) {  // by falling columns
+            for (; b >= first && beside.column[b] > inside.column[k]; --b) subtractSquare(beside, b, x, xi, sum);
+            subtractSquare(inside, k, x, xi, sum);
         }
+        for (; b >= first && beside.column[b] > i; --b) subtractSquare(beside, b, x, xi, sum);
     }
     return sum[0] + sum[1] + sum[2];
 }
@@ -198,8 +221,6 @@ void PatchEnergy::assembleConstant(int vertexCount) {
     std::vector<double> row(vertexCount, 0.0);
     std::vector<int> columns;
     std::vector<char> isIn(vertexCount, 0);
-    m_constant.resize(vertexCount, vertexCount);
-    m_constant.reserve(static_cast<Eigen::Index>(20) * vertexCount);
     for (int v = 0; v < vertexCount; ++v) {
         columns.clear();
         for (int k = start[v]; k < start[v + 1]; ++k) {
@@ -213,15 +234,13 @@ void PatchEnergy::assembleConstant(int vertexCount) {
             }
         }
         std::sort(columns.begin(), columns.end());
-        m_constant.startVec(v);
         for (const int column : columns) {
-            m_constant.insertBack(v, column) = row[column];
+            m_constant.append(column, row[column]);
             row[column] = 0.0;
             isIn[column] = 0;
         }
+        m_constant.endRow();
     }
-    m_constant.finalize();
-    m_constant.data().squeeze();
 }
 
 /// Of a shell that is flat for good the constant Hessian says all, but what mirrored patches do.
@@ -260,6 +279,7 @@ void PatchEnergy::collectPairs(std::vector<std::pair<int, int>>& pairs) const {
 }
 
 void PatchEnergy::bind(const BlockMatrix& matrix) {
+    m_constant.split(matrix);
     m_slots.clear();
     for (Element& e : m_elements) {
         const int* const v = verticesOf(e);
@@ -314,8 +334,8 @@ double PatchEnergy::flatValue(const Points& x) const {
     mean = first + mean / static_cast<double>(x.cols());
     const Mat3 map = moments * m_inverseMoments;
     for (int i = 0; i < x.cols(); ++i) m_padded.col(i).head<3>() = x.col(i) - mean - map * m_flatRest.col(i);
-    return 0.5 * constantProduct({m_constant.outerIndexPtr(), m_constant.innerIndexPtr(), m_constant.valuePtr(),
-                                  m_padded.data(), static_cast<int>(x.cols())});
+    return 0.5 *
+           constantProduct({m_constant.inside(), m_constant.beside(), m_padded.data(), static_cast<int>(x.cols())});
 }
 
 /// Of a mirrored patch, whose share the constant Hessian does not have.
@@ -336,8 +356,7 @@ void PatchEnergy::pad(const Points& x) const {
 
 void PatchEnergy::addGradient(const Points& x, Points& gradient) const {
     pad(x);
-    const ConstantRows rows{m_constant.outerIndexPtr(), m_constant.innerIndexPtr(), m_constant.valuePtr(),
-                            m_padded.data(), static_cast<int>(x.cols())};
+    const ConstantRows rows{m_constant.inside(), m_constant.beside(), m_padded.data(), static_cast<int>(x.cols())};
     addConstantGradient(rows, 0, rows.count, 1.0, gradient.data());
     const auto add = [&](int vertex, const Vec3& g) { gradient.col(vertex) += g; };
     for (const Element& e : m_elements) {
@@ -351,8 +370,7 @@ void PatchEnergy::addGradient(const Points& x, Points& gradient) const {
 void PatchEnergy::addTo(StepSystem& system, const Points& x, HessianKind kind) const {
     pad(x);
     const TermSink sink = system.sink();
-    const ConstantRows rows{m_constant.outerIndexPtr(), m_constant.innerIndexPtr(), m_constant.valuePtr(),
-                            m_padded.data(), static_cast<int>(x.cols())};
+    const ConstantRows rows{m_constant.inside(), m_constant.beside(), m_padded.data(), static_cast<int>(x.cols())};
     runRanges(system.team(), static_cast<int>(x.cols()), kRowsAtATime,
               [&](int begin, int end) { addConstantGradient(rows, begin, end, sink.gradientFactor, sink.rhs); });
     for (const Element& e : m_elements) {

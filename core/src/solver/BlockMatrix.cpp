@@ -9,31 +9,32 @@
 namespace jacket {
 namespace {
 
-/// Scalars by rows, and what they are multiplied with, in fours.
+/// Scalars by rows, and what those beside the blocks are multiplied with, in fours.
 struct ScalarRows {
-    const int *start, *column;
-    const double *value, *x;
+    ConstantHessian::Rows scalars;
+    const double* x;
     double factor;
     int count;
 };
 
 /// y += factor K x, three numbers a row of y.
-JACKET_KERNEL void addScalarRows(const ScalarRows& scalars, double* y) {
-    const ScalarRows rows = scalars;  // nobody writes there
+JACKET_KERNEL void addScalarRows(const ScalarRows& beside, double* y) {
+    const ScalarRows rows = beside;  // nobody writes there
+    const ConstantHessian::Rows& scalars = rows.scalars;
     for (int i = 0; i < rows.count; ++i) {
         Double4 even{}, odd{};  // two sums: shorter chains of additions
-        int k = rows.start[i];
-        const int end = rows.start[i + 1];
+        int k = scalars.start[i];
+        const int end = scalars.start[i + 1];
         Double4 x;
         for (; k + 1 < end; k += 2) {
-            std::memcpy(&x, rows.x + 4 * rows.column[k], sizeof(x));
-            even += rows.value[k] * x;
-            std::memcpy(&x, rows.x + 4 * rows.column[k + 1], sizeof(x));
-            odd += rows.value[k + 1] * x;
+            std::memcpy(&x, rows.x + 4 * scalars.column[k], sizeof(x));
+            even += scalars.value[k] * x;
+            std::memcpy(&x, rows.x + 4 * scalars.column[k + 1], sizeof(x));
+            odd += scalars.value[k + 1] * x;
         }
         if (k < end) {
-            std::memcpy(&x, rows.x + 4 * rows.column[k], sizeof(x));
-            even += rows.value[k] * x;
+            std::memcpy(&x, rows.x + 4 * scalars.column[k], sizeof(x));
+            even += scalars.value[k] * x;
         }
         even = rows.factor * (even + odd);
         for (int c = 0; c < 3; ++c) y[3 * i + c] += even[c];
@@ -128,9 +129,7 @@ void BlockMatrix::multiply(const double* x, double* y) const {
 void BlockMatrix::addBeside(const double* x, double* y) const {
     m_padded.resize(4 * static_cast<std::size_t>(size()));
     for (int i = 0; i < size(); ++i) std::copy_n(x + 3 * i, 3, m_padded.data() + 4 * i);
-    addScalarRows({m_beside->outerIndexPtr(), m_beside->innerIndexPtr(), m_beside->valuePtr(), m_padded.data(),
-                   m_besideFactor, size()},
-                  y);
+    addScalarRows({m_beside->beside(), m_padded.data(), m_besideFactor, size()}, y);
 }
 
 }  // namespace jacket

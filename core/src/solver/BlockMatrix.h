@@ -1,17 +1,13 @@
 #pragma once
-#include <Eigen/SparseCore>
-
 #include <memory>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "jacket/Types.h"
+#include "solver/ConstantHessian.h"
 
 namespace jacket {
-
-/// A symmetric matrix of one scalar per vertex pair, which stands for that scalar times I3.
-using ConstantHessian = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
 struct CompactShell;
 
@@ -41,8 +37,8 @@ class BlockMatrix {
     int column(int k) const { return m_column[k]; }
     std::vector<std::vector<int>> neighbours() const;  ///< per vertex those that it shares a block with
 
-    /// From now on the matrix has `factor` times `scalars` beside its blocks. They must outlive it
-    /// and never change; null: nothing.
+    /// From now on the matrix has `factor` times those of the scalars that stand beside its pattern beside its blocks.
+    /// They must outlive it and never change; null: nothing.
     void setBeside(const ConstantHessian* scalars, double factor) {
         m_beside = scalars;
         m_besideFactor = factor;

@@ -10,8 +10,7 @@ constexpr int kRowsAtATime = 512;
 struct Blocks {
     const int *lowerStart, *lowerColumn, *upperStart, *upperRow, *upperSlot;
     const double *diagonal, *lower;  ///< nine numbers a block, by columns
-    const int *besideStart, *besideColumn;
-    const double* beside;
+    ConstantHessian::Rows scalars;   ///< beside; null: none
     double besideFactor;
 };
 
@@ -29,9 +28,9 @@ JACKET_KERNEL void multiplyKernel(const Blocks& blocks, int begin, int end, cons
             const double *a = b.lower + 9 * b.upperSlot[k], *xj = x + 3 * b.upperRow[k];
             for (int c = 0; c < 3; ++c) sum[c] += a[3 * c] * xj[0] + a[3 * c + 1] * xj[1] + a[3 * c + 2] * xj[2];
         }
-        if (b.beside)
-            for (int k = b.besideStart[i]; k < b.besideStart[i + 1]; ++k)
-                for (int c = 0; c < 3; ++c) beside[c] += b.beside[k] * x[3 * b.besideColumn[k] + c];
+        if (b.scalars.value)
+            for (int k = b.scalars.start[i]; k < b.scalars.start[i + 1]; ++k)
+                for (int c = 0; c < 3; ++c) beside[c] += b.scalars.value[k] * x[3 * b.scalars.column[k] + c];
         for (int c = 0; c < 3; ++c) y[3 * i + c] = sum[c] + b.besideFactor * beside[c];
     }
 }
@@ -69,9 +68,7 @@ void BlockProduct::multiply(const BlockMatrix& matrix, const double* x, double* 
                         m_upperSlot.data(),
                         matrix.diagonal().data()->data(),
                         matrix.lower().empty() ? nullptr : matrix.lower().data()->data(),
-                        beside ? beside->outerIndexPtr() : nullptr,
-                        beside ? beside->innerIndexPtr() : nullptr,
-                        beside ? beside->valuePtr() : nullptr,
+                        beside ? beside->beside() : ConstantHessian::Rows{},
                         matrix.besideFactor()};
     runRanges(team, matrix.size(), kRowsAtATime, [&](int begin, int end) { multiplyKernel(blocks, begin, end, x, y); });
 }
@@ -84,8 +81,9 @@ void BlockProduct::addColumn(const BlockMatrix& matrix, int vertex, const Vec3& 
     for (int k = m_upperStart[vertex]; k < m_upperStart[vertex + 1]; ++k)
         add(m_upperRow[k], matrix.lower()[m_upperSlot[k]] * change);
     if (!matrix.beside()) return;
-    for (ConstantHessian::InnerIterator it(*matrix.beside(), vertex); it; ++it)  // symmetric: a row is a column
-        add(static_cast<int>(it.col()), matrix.besideFactor() * it.value() * change);
+    const auto scalars = matrix.beside()->beside();
+    for (int k = scalars.start[vertex]; k < scalars.start[vertex + 1]; ++k)  // symmetric: a row is a column
+        add(scalars.column[k], matrix.besideFactor() * scalars.value[k] * change);
 }
 
 }  // namespace jacket

@@ -166,21 +166,22 @@ CompactMatrix::CompactMatrix(const BlockMatrix& matrix) : m_size(matrix.size()) 
 
 void CompactMatrix::takeBeside(const ConstantHessian* scalars) {
     m_besideSource = scalars;
-    m_besideCount = scalars ? scalars->nonZeros() : 0;
+    m_besideCount = scalars ? scalars->besideCount() : 0;
     m_besideStart.assign(m_size + 1, 0);
     m_besideSums.assign(m_size, 0.0);
     m_besideColumn.clear();
     m_beside.clear();
     if (!scalars) return;
-    m_besideColumn.reserve(scalars->nonZeros());
-    m_beside.reserve(scalars->nonZeros());
+    m_besideColumn.reserve(m_besideCount);
+    m_beside.reserve(m_besideCount);
+    const auto from = scalars->beside();
     std::vector<std::pair<int, float>> entries;
     for (int row = 0; row < m_size; ++row) {
         entries.clear();
-        for (ConstantHessian::InnerIterator it(*scalars, m_vertexOf[row]); it; ++it) {
-            const int column = m_rowOf[it.col()];
-            m_besideSums[row] += it.value();
-            entries.emplace_back(column, static_cast<float>(it.value()));
+        const int vertex = m_vertexOf[row];
+        for (int k = from.start[vertex]; k < from.start[vertex + 1]; ++k) {
+            m_besideSums[row] += from.value[k];
+            entries.emplace_back(m_rowOf[from.column[k]], static_cast<float>(from.value[k]));
         }
         std::sort(entries.begin(), entries.end());
         for (const auto& [column, value] : entries) {
@@ -192,7 +193,7 @@ void CompactMatrix::takeBeside(const ConstantHessian* scalars) {
 }
 
 bool CompactMatrix::setValues(const BlockMatrix& matrix, WorkerTeam* team) {
-    const Eigen::Index count = matrix.beside() ? matrix.beside()->nonZeros() : 0;
+    const std::size_t count = matrix.beside() ? matrix.beside()->besideCount() : 0;
     const bool isNew = matrix.beside() != m_besideSource || count != m_besideCount;
     if (isNew) takeBeside(matrix.beside());
     m_besideFactor = matrix.besideFactor();

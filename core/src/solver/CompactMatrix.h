@@ -73,7 +73,7 @@ class CompactMatrix {
     std::vector<int> m_rowOf, m_vertexOf, m_rowStart, m_column, m_source;
     std::vector<float> m_blocks, m_rowSums;
     const ConstantHessian* m_besideSource = nullptr;
-    Eigen::Index m_besideCount = 0;  ///< entries when it was taken
+    std::size_t m_besideCount = 0;  ///< scalars when it was taken
     std::vector<int> m_besideStart, m_besideColumn;
     std::vector<float> m_beside;
     std::vector<double> m_besideSums;  ///< of whole rows

@@ -12,9 +12,10 @@ using Neighbours = std::vector<std::vector<int>>;
 /// Calls `visit(i, j)`, i > j, for what stands beside the blocks of a matrix.
 void forBeside(const BlockMatrix& matrix, const auto& visit) {
     if (!matrix.beside()) return;
+    const auto scalars = matrix.beside()->beside();
     for (int i = 0; i < matrix.size(); ++i)
-        for (ConstantHessian::InnerIterator entry(*matrix.beside(), i); entry; ++entry)
-            if (entry.col() < i) visit(i, static_cast<int>(entry.col()), entry.value());
+        for (int k = scalars.start[i]; k < scalars.start[i + 1] && scalars.column[k] < i; ++k)
+            visit(i, scalars.column[k], scalars.value[k]);
 }
 
 /// Calls `visit(i, j, k)`, i > j, for block k of a matrix.
@@ -49,8 +50,8 @@ std::vector<int> pairUp(const BlockMatrix& matrix) {
 
 /// Another matrix may stand where one was; of the same size, it is one of the same mesh.
 bool ShellFactor::isOf(const BlockMatrix& matrix) const {
-    const auto entries = matrix.beside() ? matrix.beside()->nonZeros() : 0;
-    return m_pattern == &matrix && m_beside == matrix.beside() && m_besideCount == entries &&
+    const std::size_t count = matrix.beside() ? matrix.beside()->besideCount() : 0;
+    return m_pattern == &matrix && m_beside == matrix.beside() && m_besideCount == count &&
            m_slot.size() == matrix.diagonal().size() && m_lowerPlace.size() == matrix.lower().size();
 }
 
@@ -58,7 +59,7 @@ bool ShellFactor::isOf(const BlockMatrix& matrix) const {
 void ShellFactor::analyse(const BlockMatrix& matrix) {
     m_pattern = &matrix;
     m_beside = matrix.beside();
-    m_besideCount = m_beside ? m_beside->nonZeros() : 0;
+    m_besideCount = m_beside ? m_beside->besideCount() : 0;
     const std::vector<int> pairOf = pairUp(matrix);
     const int pairs = 1 + *std::max_element(pairOf.begin(), pairOf.end());
     Neighbours neighbours(pairs), ordered(pairs);

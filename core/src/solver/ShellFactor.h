@@ -26,7 +26,7 @@ class ShellFactor {
 
     const BlockMatrix* m_pattern = nullptr;
     const ConstantHessian* m_beside = nullptr;
-    Eigen::Index m_besideCount = 0;
+    std::size_t m_besideCount = 0;
     std::vector<int> m_slot;  ///< of each vertex: half block rows
     std::vector<int> m_free;  ///< half block rows of no vertex
     /// Where the factor keeps a block of the matrix, or one that stands beside it below the diagonal; ~: its transpose.

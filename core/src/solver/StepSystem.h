@@ -8,13 +8,6 @@
 
 namespace jacket {
 
-/// A Hessian that never changes and is a scalar per vertex pair, sorted by where its scalars go.
-struct ConstantPart {
-    std::vector<double> lower;  ///< of every block that the matrix' pattern has below the diagonal [N/m]
-    Eigen::VectorXd diagonal;   ///< [N/m]
-    ConstantHessian beside;     ///< all others
-};
-
 /// Where loops over many terms write: the right side by 3 numbers a vertex, blocks by 9, each with the factor that
 /// takes a term's gradient and Hessian there.
 struct TermSink {
@@ -39,19 +32,14 @@ class StepSystem {
     void setTeam(WorkerTeam* team) { m_team = team; }
     WorkerTeam* team() const { return m_team; }
 
-    /// `constant` must outlive the system.
-    void begin(double h, double stiffnessDamping, const ConstantPart* constant = nullptr) {
+    /// `constant`: the part of the Hessian that never changes [N/m], split for the matrix. It must outlive the system.
+    void begin(double h, double stiffnessDamping, const ConstantHessian* constant = nullptr) {
         m_h = h;
         m_stiffnessFactor = h * h + h * stiffnessDamping;
         rhs.setZero(3, matrix.size());
-        if (!constant) {
-            matrix.setZero();
-            matrix.setBeside(nullptr, 0.0);
-            return;
-        }
-        fill(matrix.lower(), constant->lower.data());
-        fill(matrix.diagonal(), constant->diagonal.data());
-        matrix.setBeside(&constant->beside, m_stiffnessFactor);
+        matrix.setBeside(constant, constant ? m_stiffnessFactor : 0.0);
+        if (!constant) return matrix.setZero();
+        for (int row = 0; row < matrix.size(); ++row) fillRow(row, constant->inside());
     }
 
     /// One term of an energy. `slots`: see StencilSlots.
@@ -112,10 +100,15 @@ class StepSystem {
     }
 
   private:
-    void fill(std::vector<Mat3>& blocks, const double* scalars) const {
-        for (std::size_t i = 0; i < blocks.size(); ++i) {
-            blocks[i].setZero();
-            blocks[i].diagonal().setConstant(m_stiffnessFactor * scalars[i]);
+    void fillRow(int row, const ConstantHessian::Rows& scalars) {
+        matrix.diagonal()[row].setZero();
+        for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) matrix.lower()[k].setZero();
+        int block = matrix.rowBegin(row);
+        for (int k = scalars.start[row]; k < scalars.start[row + 1] && scalars.column[k] <= row; ++k) {
+            const int column = scalars.column[k];
+            while (column < row && matrix.column(block) != column) ++block;
+            Mat3& to = column < row ? matrix.lower()[block] : matrix.diagonal()[row];
+            to.diagonal().setConstant(m_stiffnessFactor * scalars.value[k]);
         }
     }
 
