@@ -104,6 +104,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     m_mostFrictionRounds = m_memory.empty() ? kFrictionRounds : kFrictionRoundsGoingOn;
     m_anyFast = false;
     m_held.assign(y.cols(), 0);
+    m_filters.clear();
     m_filterOf.assign(y.cols(), -1);
     m_edge.clear();
     double shortest = 1e300, speed = 0.0;
