@@ -14,7 +14,7 @@ constexpr double kBounceError = 0.005;  // of its speed: how much slower a soft 
 double ContactResponse::leavingSpeed(const Touch& touch) const {
     const Contact& c = touch.contact;
     if (!(c.restitution > 0.0) || (touch.dynamicBody < 0 && isHeld(c))) return 0.0;
-    Vec3 u = -touch.carried;
+    Vec3 u = -carriedOf(touch);
     if (touch.dynamicBody >= 0) u -= pointVelocity(m_input.bodies[c.body].startTwist, touch.arm);
     for (int a = 0; a < 3; ++a) u += c.weights[a] * m_input.shells[c.shell]->velocities().col(c.vertices[a]);
     const double closing = -u.dot(c.normal);

@@ -84,7 +84,7 @@ bool ContactResponse::closeFirst(int round) {
     const auto first = std::min_element(m_found.begin(), m_found.end(),
                                         [](const Contact& a, const Contact& b) { return a.time < b.time; });
     const auto [known, fresh] = m_index.try_emplace(keyOf(*first), static_cast<int>(m_touches.size()));
-    if (fresh) m_touches.push_back(makeTouch(*first));
+    if (fresh) add(makeTouch(*first));
     Touch& touch = m_touches[known->second];
     if (touch.active && round >= kFreezeRound) return false;
     place(touch, *first);
@@ -148,7 +148,7 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     m_deepestGap = std::min(m_deepestGap, lacks);
     if (fresh) {
         m_index[keyOf(contact)] = static_cast<int>(m_touches.size());
-        m_touches.push_back(makeTouch(contact));
+        add(makeTouch(contact));
     }
     Touch& touch = fresh ? m_touches.back() : m_touches[known];
     if (!touch.active) {
@@ -318,7 +318,8 @@ void ContactResponse::findPushes(const Points& v) {
 double ContactResponse::gapBefore(const Touch& touch) const {
     const Contact& contact = touch.contact;
     const Vec3 move = m_end[contact.shell].col(contact.vertices[0]) -
-                      m_input.shells[contact.shell]->positions().col(contact.vertices[0]) - m_input.h * touch.carried;
+                      m_input.shells[contact.shell]->positions().col(contact.vertices[0]) -
+                      m_input.h * carriedOf(touch);
     const double gap = touch.startGap + move.dot(contact.normal) - touch.offset - touch.allowedGap;
     if (!std::isnan(gap)) return gap;
     return touch.active ? 0.0 : std::numeric_limits<double>::infinity();

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "Room.h"
+
 namespace jacket {
 namespace {
 
@@ -80,13 +82,23 @@ void ContactResponse::place(Touch& touch, const Contact& contact) const {
     touch.contact = contact;
     touch.arm = point - body.position;
     touch.dynamicBody = m_dynamicIndex[contact.body];
-    touch.carried = body.prescribed ? pointVelocity(body.freeTwist, touch.arm) : Vec3::Zero();
+}
+
+/// Surface velocity of a prescribed body there, 0 of others [m/s].
+Vec3 ContactResponse::carriedOf(const Touch& touch) const {
+    const CoupledBody& body = m_input.bodies[touch.contact.body];
+    return body.prescribed ? pointVelocity(body.freeTwist, touch.arm) : Vec3::Zero();
 }
 
 ContactResponse::Touch ContactResponse::makeTouch(const Contact& contact) const {
     Touch touch;
     place(touch, contact);
     return touch;  // frictionless at first: its normal impulse is not known yet
+}
+
+void ContactResponse::add(const Touch& touch) {
+    makeRoom(m_touches);
+    m_touches.push_back(touch);
 }
 
 void ContactResponse::begin(const IslandInput& input, const Numbering& numbering, const Points& expected, Points& y) {
@@ -134,6 +146,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     m_found.clear();
     input.contacts->find({m_startPoses, m_still, 0.0}, reach, m_memory.empty() ? kNone : 10.0 * m_vertexSlop, m_found);
     findRoomBesideFaces();
+    makeRoomFor(m_found.size(), m_touches);
     for (const Contact& contact : m_found) addAtStart(contact, y);
     findFast();
     if (isQuick() && (isAnyBouncy() || m_anyFast)) m_care = inFull;
@@ -192,7 +205,7 @@ void ContactResponse::addAtStart(const Contact& contact, Points& y) {
     if (!fresh && !isRather(touch, m_touches[known->second], memory)) return;
     if (touch.contact.gap < 0.0) alter(touch, y);
     if (fresh)
-        m_touches.push_back(touch);
+        add(touch);
     else
         m_touches[known->second] = touch;
 }
@@ -248,7 +261,7 @@ void ContactResponse::sweepAtStart() {
         Touch touch = makeTouch(contact);
         touch.target = -contact.gap / m_input.h;
         touch.active = true;
-        m_touches.push_back(touch);
+        add(touch);
     }
 }
 
@@ -344,7 +357,7 @@ bool ContactResponse::joinFilter(int index) {
             {.constraint = static_cast<int>(m_constraints.size()), .count = 1, .touches = {index, 0, 0}});
         VertexConstraint c{.vertex = vertex, .body = touch.dynamicBody};
         c.arm = touch.arm;
-        c.carried = touch.carried;
+        c.carried = carriedOf(touch);
         m_constraints.push_back(c);
         return true;
     }
@@ -366,7 +379,7 @@ bool ContactResponse::joinFilter(int index) {
 void ContactResponse::jam(Touch& touch, const Touch& other) const {
     const Vec3& n = touch.contact.normal;
     if (touch.dynamicBody >= 0 || other.dynamicBody >= 0 || !isFacing(touch.contact, other.contact)) return;
-    const double most = -other.target + n.dot(other.carried - touch.carried);
+    const double most = -other.target + n.dot(carriedOf(other) - carriedOf(touch));
     if (touch.target <= most) return;
     const double between = 0.5 * (touch.target + most);
     touch.between = touch.jammed ? std::min(touch.between, between) : between;
@@ -410,7 +423,7 @@ void ContactResponse::finishFilter(VertexFilter& filter, VertexConstraint& const
     for (int k = 0; k < filter.count; ++k) {
         const Touch& touch = m_touches[filter.touches[k]];
         const Vec3& n = touch.contact.normal;
-        const double target = touch.target + n.dot(touch.carried - first.carried);
+        const double target = touch.target + n.dot(carriedOf(touch) - carriedOf(first));
         const Vec3 fresh = n - held * n;  // the part of this normal that earlier ones leave open
         const double length2 = fresh.squaredNorm();
         if (length2 < 1e-4) continue;
@@ -475,7 +488,7 @@ SoftRow ContactResponse::makeRow(Touch& touch, const CoupledSystem& system) cons
     row.weights = c.weights;
     row.body = touch.dynamicBody;
     row.arm = touch.arm;
-    row.carried = touch.carried;
+    row.carried = carriedOf(touch);
     if (touch.jammed) {
         row.stiffness = touch.kappa * Mat3::Identity();
         row.load = touch.kappa * touch.between * c.normal;
@@ -488,7 +501,7 @@ SoftRow ContactResponse::makeRow(Touch& touch, const CoupledSystem& system) cons
 }
 
 Vec3 ContactResponse::relativeVelocity(const Touch& touch, const IslandVelocities& solved) const {
-    Vec3 u = -touch.carried;
+    Vec3 u = -carriedOf(touch);
     for (int a = 0; a < 3; ++a) u += touch.contact.weights[a] * solved.v.col(globalVertex(touch.contact, a));
     if (touch.dynamicBody >= 0) u -= pointVelocity(solved.w.col(touch.dynamicBody), touch.arm);
     return u;
@@ -608,7 +621,7 @@ bool ContactResponse::releasePulling(int round) {
         const double pull = isLater ? kMuch : touch.isPinched ? kAmongWalls.pull : m_care.pull;
         // In doubt a wall holds: what is released last may end inside it. One that moves would drag the shell along,
         // and a light body would feel it.
-        const bool isStill = isWithoutBodies && touch.carried.isZero(0.0);
+        const bool isStill = isWithoutBodies && carriedOf(touch).isZero(0.0);
         const bool mayGo = touch.changes < kMostChanges - isStill && !(isStill && isLast(round + 1));
         if (touch.normalImpulse < -pull * most && !touch.jammed && mayGo) {
             letGo(touch);

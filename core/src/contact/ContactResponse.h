@@ -81,32 +81,33 @@ class ContactResponse {
         double speed = 0.0;       ///< of sliding [m/s]
         Vec3 held{0, 0, 0};       ///< impulse on a sticking soft row, its multiplier [N s]
     };
-    /// A contact through the rounds of one step.
+    /// A contact through the rounds of one step. There are thousands where a sheet comes down: what follows from the
+    /// contact is not kept, and small members stand together.
     struct Touch {
         Contact contact;
-        Vec3 arm{0, 0, 0}, carried{0, 0, 0};
-        int dynamicBody = -1;
+        Vec3 arm{0, 0, 0};
         double target = 0.0;  ///< least normal velocity relative to the body [m/s]
         double startGap = std::numeric_limits<double>::quiet_NaN();  ///< of a contact as the start found it [m]
-        double allowedGap = 0.0;  ///< <= 0: what it stood inside at the start and need not leave at once [m]
-        bool active = false, sticks = false, isRow = false;
+        double allowedGap = 0.0;           ///< <= 0: what it stood inside at the start and need not leave at once [m]
         double lambda = 0.0, kappa = 0.0;  ///< soft rows: multiplier [N s] and penalty [kg]
         double missed = 0.0;               ///< by which its multiplier was last raised, if it still aims at that [m/s]
-        bool isVain = false;               ///< its multiplier does not help: others hold it where it is
-        bool isPinched = false;            ///< a soft row of vertices that another body holds
-        bool bounces = false;              ///< its target is that of restitution
-        bool jammed = false;               ///< walls on both sides leave it no room
-        double between = 0.0;              ///< its target then: half way to the other wall [m/s]
+        double between = 0.0;              ///< its target where it is jammed: half way to the other wall [m/s]
+        double offset = 0.0;               ///< how far it is kept off the surface for its chords' sake [m]
+        double lifted = 0.0;               ///< by how much that grew in this round [m]
+        double normalImpulse = 0.0;        ///< < 0: it pulls, and is to be released [N s]
+        double pressing = 0.0;             ///< the same where walls that share its vertex may not pull [N s]
+        Vec3 impulse{0, 0, 0};             ///< on the shell [N s]
+        Vec3 slide{0, 0, 0};               ///< tangential velocity relative to the body in the last solve [m/s]
         Slip slip;
-        int flips = 0;               ///< between sticking and sliding, in this step
-        bool pressed = false;        ///< a wall faces it: it is not to be kept off the surface
-        double offset = 0.0;         ///< how far it is kept off the surface for its chords' sake [m]
-        double lifted = 0.0;         ///< by how much that grew in this round [m]
-        double normalImpulse = 0.0;  ///< < 0: it pulls, and is to be released [N s]
-        double pressing = 0.0;       ///< the same where walls that share its vertex may not pull [N s]
-        Vec3 impulse{0, 0, 0};       ///< on the shell [N s]
-        Vec3 slide{0, 0, 0};         ///< tangential velocity relative to the body in the last solve [m/s]
-        int changes = 0;             ///< how often it was activated or dropped
+        int dynamicBody = -1;
+        int flips = 0;    ///< between sticking and sliding, in this step
+        int changes = 0;  ///< how often it was activated or dropped
+        bool active = false, sticks = false, isRow = false;
+        bool isVain = false;     ///< its multiplier does not help: others hold it where it is
+        bool isPinched = false;  ///< a soft row of vertices that another body holds
+        bool bounces = false;    ///< its target is that of restitution
+        bool jammed = false;     ///< walls on both sides leave it no room
+        bool pressed = false;    ///< a wall faces it: it is not to be kept off the surface
     };
     /// How exactly a step's contacts are settled; what remains is left to the next step.
     struct Care {
@@ -156,6 +157,8 @@ class ContactResponse {
     Key keyOf(const Contact& c) const;
     const Memory* remembered(const Contact& c) const;
     Touch makeTouch(const Contact& contact) const;
+    void add(const Touch& touch);
+    Vec3 carriedOf(const Touch& touch) const;
     void place(Touch& touch, const Contact& contact) const;
     Vec3 relativeVelocity(const Touch& touch, const IslandVelocities& solved) const;
     double timeOfTouch(const Touch& touch) const;

@@ -1,5 +1,7 @@
 #include "solver/FilteredMatrix.h"
 
+#include "Room.h"
+
 namespace jacket {
 
 void FilteredMatrix::begin(const BlockMatrix& matrix, bool isDiagonal) {
@@ -12,8 +14,7 @@ void FilteredMatrix::begin(const BlockMatrix& matrix, bool isDiagonal) {
 
 Mat3& FilteredMatrix::alter(int& place, const Mat3& block) {
     if (place >= 0) return m_altered[place];
-    if (m_altered.size() == m_altered.capacity())  // by a quarter: doubled, they would soon be as many as all blocks
-        m_altered.reserve(m_altered.size() + m_altered.size() / 4 + 64);
+    makeRoom(m_altered);
     place = static_cast<int>(m_altered.size());
     m_altered.push_back(block);
     return m_altered.back();
