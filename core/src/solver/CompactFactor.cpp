@@ -11,7 +11,7 @@ namespace {
 
 /// What a factor is made of, as plain memory for the kernels. Blocks are nine numbers by columns.
 struct Factoring {
-    const int *vertexOf, *rowStart, *column, *source, *pairStart, *pairs, *upperOf;
+    const int *vertexOf, *rowStart, *column, *source, *pairStart, *pairs, *upperOf, *inversePlace, *scaledPlace;
     FilteredMatrix::Blocks diagonal, values;
     double *inverse, *scaled;
     float *root, *rootTransposed, *lower, *upper;
@@ -120,16 +120,17 @@ JACKET_KERNEL bool factorKernel(const Factoring& factoring, int begin, int end, 
             loadBlock(blockAt(f.values, isLower ? f.source[k] : ~f.source[k]), block);
             if (!isLower) transpose(block);
             for (int pair = f.pairStart[k]; pair < f.pairStart[k + 1]; ++pair) {
-                loadBlock(row + 9 * (f.pairs[2 * pair] - f.rowStart[i]), left);
+                loadBlock(row + 9 * f.pairs[2 * pair], left);
                 subtractTransposedProduct(left, f.scaled + 9 * f.pairs[2 * pair + 1], block);
             }
-            storeBlock(block, f.scaled + 9 * k);
-            const double* inverse = f.inverse + 9 * f.column[k];
+            double* const scaled = f.scaled + 9 * f.scaledPlace[k];
+            storeBlock(block, scaled);
+            const double* inverse = f.inverse + 9 * f.inversePlace[f.column[k]];
             for (int column = 0; column < 3; ++column)
                 left[column] = block[0] * inverse[3 * column] + block[1] * inverse[3 * column + 1] +
                                block[2] * inverse[3 * column + 2];
             storeBlock(left, row + 9 * (k - f.rowStart[i]));
-            subtractTransposedProduct(left, f.scaled + 9 * k, d);
+            subtractTransposedProduct(left, scaled, d);
             storeRounded(left, f.lower + 9 * k);
             transpose(left);
             storeRounded(left, f.upper + 9 * f.upperOf[k]);
@@ -137,7 +138,7 @@ JACKET_KERNEL bool factorKernel(const Factoring& factoring, int begin, int end, 
         const Triangular t = triangular(d);
         if (!(t.d0 > kLeast * before.d0 && t.d1 > kLeast * before.d1 && t.d2 > kLeast * before.d2)) return false;
         if (!(t.d0 > 0.0 && t.d1 > 0.0 && t.d2 > 0.0)) return false;
-        storeRoot(t, f.root + 9 * i, f.rootTransposed + 9 * i, f.inverse + 9 * i);
+        storeRoot(t, f.root + 9 * i, f.rootTransposed + 9 * i, f.inverse + 9 * f.inversePlace[i]);
     }
     return true;
 }
@@ -170,6 +171,26 @@ CompactFactor::CompactFactor(const CompactMatrix& matrix)
       m_vertexOf(matrix.vertexOf()),
       m_rowStart(1, 0),
       m_upperStart(1, 0) {
+    takePattern(matrix);
+    findPairs();
+    placeValues();
+    for (auto* perRow : {&m_root, &m_rootTransposed}) perRow->assign(9 * m_size + 3, 0.0f);
+    for (int row = 0; row < m_size; ++row) m_mostInRow = std::max(m_mostInRow, m_rowStart[row + 1] - m_rowStart[row]);
+    m_rows.assign(9 * static_cast<std::size_t>(m_mostInRow) * stripCount(), 0.0);
+    for (auto* perBlock : {&m_lower, &m_upper}) perBlock->assign(9 * m_column.size() + 3, 0.0f);
+}
+
+int CompactFactor::Places::take() {
+    if (m_free.empty()) return m_count++;
+    const int place = m_free.back();
+    m_free.pop_back();
+    return place;
+}
+
+void CompactFactor::takePattern(const CompactMatrix& matrix) {
+    const std::size_t count = m_size > 0 ? matrix.rowEnd(m_size - 1) / 2 : 0;
+    for (auto* perBlock : {&m_column, &m_source, &m_upperColumn}) perBlock->reserve(count);
+    for (auto* perRow : {&m_rowStart, &m_upperStart}) perRow->reserve(m_size + 1);
     for (int row = 0; row < m_size; ++row) {
         for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) {
             if (matrix.column(k) < row) {
@@ -182,7 +203,12 @@ CompactFactor::CompactFactor(const CompactMatrix& matrix)
         m_rowStart.push_back(static_cast<int>(m_column.size()));
         m_upperStart.push_back(static_cast<int>(m_upperColumn.size()));
     }
+}
+
+void CompactFactor::findPairs() {
     std::vector<int> next(m_upperStart.begin(), m_upperStart.end() - 1);
+    m_upperOf.reserve(m_column.size());
+    m_pairStart.reserve(m_column.size() + 1);
     m_pairStart.assign(1, 0);
     for (int row = 0; row < m_size; ++row)
         for (int k = m_rowStart[row]; k < m_rowStart[row + 1]; ++k) {
@@ -191,26 +217,69 @@ CompactFactor::CompactFactor(const CompactMatrix& matrix)
             const int qEnd = m_rowStart[m_column[k] + 1];
             for (int p = m_rowStart[row]; p < k; ++p) {  // columns that the two rows share
                 while (q < qEnd && m_column[q] < m_column[p]) ++q;
-                if (q < qEnd && m_column[q] == m_column[p]) m_pairs.insert(m_pairs.end(), {p, q});
+                if (q < qEnd && m_column[q] == m_column[p]) m_pairs.insert(m_pairs.end(), {p - m_rowStart[row], q});
             }
             m_pairStart.push_back(static_cast<int>(m_pairs.size() / 2));
         }
-    m_inverse.assign(9 * m_size, 0.0);
-    for (auto* perRow : {&m_root, &m_rootTransposed}) perRow->assign(9 * m_size + 3, 0.0f);
-    m_scaled.assign(9 * m_column.size(), 0.0);
-    for (int row = 0; row < m_size; ++row) m_mostInRow = std::max(m_mostInRow, m_rowStart[row + 1] - m_rowStart[row]);
-    m_rows.assign(9 * static_cast<std::size_t>(m_mostInRow) * stripCount(), 0.0);
-    for (auto* perBlock : {&m_lower, &m_upper}) perBlock->assign(9 * m_column.size() + 3, 0.0f);
+    m_pairs.shrink_to_fit();
+}
+
+/// Rows need those of the last few levels, or of the strips beside a separator: few of all.
+void CompactFactor::placeValues() {
+    std::vector<int> lastUse(m_column.size(), -1);  // row that needs L D
+    for (int row = 0; row < m_size; ++row)
+        for (int pair = m_pairStart[m_rowStart[row]]; pair < m_pairStart[m_rowStart[row + 1]]; ++pair)
+            lastUse[m_pairs[2 * pair + 1]] = row;
+    m_inversePlace.resize(m_size);
+    m_scaledPlace.resize(m_column.size());
+    Places inverse, scaled;
+    for (std::size_t part = 0; part + 1 < m_partStart.size(); ++part) {
+        inverse.keepTaken();  // other parts may be factored at the same time
+        scaled.keepTaken();
+        for (int row = m_partStart[part]; row < m_partStart[part + 1]; ++row) {
+            placeInverse(row, m_partStart[part], inverse);
+            placeScaled(row, m_partStart[part], lastUse, scaled);
+        }
+    }
+    m_inverse.assign(9 * static_cast<std::size_t>(inverse.count()), 0.0);
+    m_scaled.assign(9 * static_cast<std::size_t>(scaled.count()), 0.0);
+}
+
+/// Takes a row's place, and gives back those of its part, which begins with row `first`, that it is the last to need.
+void CompactFactor::placeInverse(int row, int first, Places& places) {
+    const auto isLast = [&](int user, int of) {
+        return m_upperStart[of] == m_upperStart[of + 1] ? user == of : user == m_upperColumn[m_upperStart[of + 1] - 1];
+    };
+    m_inversePlace[row] = places.take();
+    for (int k = m_rowStart[row]; k < m_rowStart[row + 1]; ++k)
+        if (m_column[k] >= first && isLast(row, m_column[k])) places.giveBack(m_inversePlace[m_column[k]]);
+    if (isLast(row, row)) places.giveBack(m_inversePlace[row]);
+}
+
+/// The same of its blocks. `lastUse`: row that needs each of them, < 0: none but its own.
+void CompactFactor::placeScaled(int row, int first, const std::vector<int>& lastUse, Places& places) {
+    const int begin = m_rowStart[row], end = m_rowStart[row + 1];
+    for (int k = begin; k < end; ++k) m_scaledPlace[k] = places.take();
+    for (int k = begin; k < end; ++k)
+        if (lastUse[k] < 0) places.giveBack(m_scaledPlace[k]);
+    for (int pair = m_pairStart[begin]; pair < m_pairStart[end]; ++pair) {
+        int& q = m_pairs[2 * pair + 1];
+        const bool isOver = q >= m_rowStart[first] && lastUse[q] == row;
+        q = m_scaledPlace[q];
+        if (isOver) places.giveBack(q);
+    }
 }
 
 void CompactFactor::factor(const FilteredMatrix& matrix, WorkerTeam* team) {
     constexpr double kMostShift = 1e3;  // as good as block Jacobi; keeps the loop finite on garbage
     m_shift *= 0.9;  // let it shrink again when the breakdown is over; a factor cares little for its size
     if (m_shift < 1e-3) m_shift = 0.0;
-    Factoring f{m_vertexOf.data(),       m_rowStart.data(), m_column.data(),  m_source.data(),
-                m_pairStart.data(),      m_pairs.data(),    m_upperOf.data(), matrix.diagonalBlocks(),
-                matrix.lowerBlocks(),    m_inverse.data(),  m_scaled.data(),  m_root.data(),
-                m_rootTransposed.data(), m_lower.data(),    m_upper.data(),   m_shift};
+    Factoring f{m_vertexOf.data(),       m_rowStart.data(),     m_column.data(),
+                m_source.data(),         m_pairStart.data(),    m_pairs.data(),
+                m_upperOf.data(),        m_inversePlace.data(), m_scaledPlace.data(),
+                matrix.diagonalBlocks(), matrix.lowerBlocks(),  m_inverse.data(),
+                m_scaled.data(),         m_root.data(),         m_rootTransposed.data(),
+                m_lower.data(),          m_upper.data(),        m_shift};
     const int strips = stripCount();
     const auto factorParts = [&](int first, int count) {
         std::atomic<bool> works = true;

@@ -30,6 +30,23 @@ class CompactFactor {
     };
 
   private:
+    /// Hands out places: those that have been given back before others.
+    class Places {
+      public:
+        int take();
+        void giveBack(int place) { m_free.push_back(place); }
+        void keepTaken() { m_free.clear(); }  ///< what has been handed out so far stays so
+        int count() const { return m_count; }
+
+      private:
+        std::vector<int> m_free;
+        int m_count = 0;
+    };
+    void takePattern(const CompactMatrix& matrix);
+    void findPairs();
+    void placeValues();
+    void placeInverse(int row, int first, Places& places);
+    void placeScaled(int row, int first, const std::vector<int>& lastUse, Places& places);
     Solving solving() const;
     void factorDiagonally(const FilteredMatrix& matrix);
     int m_size;
@@ -37,11 +54,13 @@ class CompactFactor {
     std::vector<int> m_vertexOf;   ///< of each row
     /// Strictly lower blocks by rows: column, and where they come from (see CompactMatrix::source).
     std::vector<int> m_rowStart, m_column, m_source;
-    /// Block k loses L_p D L_q^T for its pairs (p, q).
+    /// Block k loses L_p D L_q^T for its pairs: p counted within the row, and where L_q D is kept.
     std::vector<int> m_pairStart, m_pairs;
     /// Strictly upper blocks of L^T by rows, and the place there of each lower block.
     std::vector<int> m_upperStart, m_upperColumn, m_upperOf;
-    std::vector<double> m_inverse, m_scaled;      ///< D^-1, L D
+    /// D^-1 of rows and L D of blocks are kept until the last row that needs them, and others take their places.
+    std::vector<int> m_inversePlace, m_scaledPlace;
+    std::vector<double> m_inverse, m_scaled;
     int m_mostInRow = 0;                          ///< lower blocks
     std::vector<double> m_rows;                   ///< scratch: one row of L for each strip
     std::vector<float> m_root, m_rootTransposed;  ///< W and W^T, W^T W = D^-1
