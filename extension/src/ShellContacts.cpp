@@ -11,6 +11,22 @@ namespace {
 
 constexpr double kSameSide = 0.97;  // cosine of the angle below which two normals at a vertex count as one
 
+/// Room for so many more, and a few besides. An empty list gives its memory back first.
+template <class T>
+void makeRoom(std::vector<T>& list, std::size_t more) {
+    const std::size_t count = list.size() + more;
+    if (count <= list.capacity()) return;
+    if (list.empty()) list = std::vector<T>();
+    list.reserve(count + count / 8 + 16);
+}
+
+/// Appends to a list of thousands, which grows by a quarter: doubled, it would soon be twice what is needed.
+template <class T>
+void append(std::vector<T>& list, const T& element) {
+    if (list.size() == list.capacity()) list.reserve(list.size() + list.size() / 4 + 16);
+    list.push_back(element);
+}
+
 bool isAbove(const Vec3& point, const SurfacePoint& plane) {
     const Vec3 offset = point - plane.point;
     return plane.normal.dot(offset) > 1e-6 * offset.norm();
@@ -119,7 +135,7 @@ void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
         m_memory.outside[i] = outside;
         if (outside) continue;
         if (const auto surface = piece.touch(Vec3(toBody * x), query.vertexReach + query.thickness()))
-            m_memory.candidates.push_back({i, *surface});
+            append(m_memory.candidates, {i, *surface});
     }
 }
 
@@ -158,7 +174,7 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
         touched.clear();
         patch->touch(Vec3(x.col(i)), reach, depth, touched);
         for (const SurfacePoint& s : touched)
-            m_memory.candidates.push_back({i, {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance}});
+            append(m_memory.candidates, {i, {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance}});
     }
     if (!query.wantsFaces()) return;
     std::vector<TrianglePoint> faces;
@@ -198,6 +214,7 @@ void ShellContacts::addVertices(Query& query) {
     };
     if (!std::is_sorted(candidates.begin(), candidates.end(), isBefore))  // one piece: it is
         std::stable_sort(candidates.begin(), candidates.end(), isBefore);
+    makeRoom(query.contacts, candidates.size());
     std::vector<SurfacePoint>& kept = m_memory.kept;
     for (std::size_t first = 0, next; first < candidates.size(); first = next) {
         const int vertex = candidates[first].vertex;
@@ -275,7 +292,7 @@ void ShellContacts::add(Query& query, int feature, const SurfacePoint& surface, 
     contact.gap = surface.distance - query.thickness();
     const auto [known, fresh] = m_byFeature.try_emplace(feature, query.contacts.size());
     if (fresh)
-        query.contacts.push_back(contact);
+        append(query.contacts, contact);
     else if (contact.gap < query.contacts[known->second].gap)
         query.contacts[known->second] = contact;
 }
