@@ -58,7 +58,14 @@ class Grouping {
         group.areas.push_back(areaA + areaB);
         group.triangles.push_back(first);
     }
-    std::vector<Group> take() { return std::move(m_groups); }
+    std::vector<Group> take() {
+        for (Group& group : m_groups) {
+            group.stencils.shrink_to_fit();
+            group.areas.shrink_to_fit();
+            group.triangles.shrink_to_fit();
+        }
+        return std::move(m_groups);
+    }
 
   private:
     const Model& m_model;
