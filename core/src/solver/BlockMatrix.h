@@ -35,7 +35,9 @@ class BlockMatrix {
     int rowBegin(int row) const { return m_rowStart[row]; }
     int rowEnd(int row) const { return m_rowStart[row + 1]; }
     int column(int k) const { return m_column[k]; }
-    std::vector<std::vector<int>> neighbours() const;  ///< per vertex those that it shares a block with
+    const std::vector<int>& rowStarts() const { return m_rowStart; }  ///< rowBegin of all rows, and the last one's end
+    const std::vector<int>& columns() const { return m_column; }      ///< of all blocks
+    std::vector<std::vector<int>> neighbours() const;                 ///< per vertex those that it shares a block with
 
     /// From now on the matrix has `factor` times those of the scalars that stand beside its pattern beside its blocks.
     /// They must outlive it and never change; null: nothing.

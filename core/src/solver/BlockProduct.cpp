@@ -38,17 +38,8 @@ JACKET_KERNEL void multiplyKernel(const Blocks& blocks, int begin, int end, cons
 }  // namespace
 
 BlockProduct::BlockProduct(const BlockMatrix& matrix)
-    : m_lowerStart(1, 0),
-      m_upperStart(matrix.size() + 1, 0),
-      m_upperRow(matrix.lower().size()),
-      m_upperSlot(matrix.lower().size()) {
-    for (int i = 0; i < matrix.size(); ++i) {
-        for (int k = matrix.rowBegin(i); k < matrix.rowEnd(i); ++k) {
-            m_lowerColumn.push_back(matrix.column(k));
-            ++m_upperStart[matrix.column(k) + 1];
-        }
-        m_lowerStart.push_back(matrix.rowEnd(i));
-    }
+    : m_upperStart(matrix.size() + 1, 0), m_upperRow(matrix.lower().size()), m_upperSlot(matrix.lower().size()) {
+    for (const int column : matrix.columns()) ++m_upperStart[column + 1];
     for (int i = 0; i < matrix.size(); ++i) m_upperStart[i + 1] += m_upperStart[i];
     std::vector<int> next(m_upperStart.begin(), m_upperStart.end() - 1);
     for (int i = 0; i < matrix.size(); ++i)
@@ -61,8 +52,8 @@ BlockProduct::BlockProduct(const BlockMatrix& matrix)
 
 void BlockProduct::multiply(const BlockMatrix& matrix, const double* x, double* y, WorkerTeam* team) const {
     const ConstantHessian* beside = matrix.beside();
-    const Blocks blocks{m_lowerStart.data(),
-                        m_lowerColumn.data(),
+    const Blocks blocks{matrix.rowStarts().data(),
+                        matrix.columns().data(),
                         m_upperStart.data(),
                         m_upperRow.data(),
                         m_upperSlot.data(),
@@ -76,8 +67,8 @@ void BlockProduct::multiply(const BlockMatrix& matrix, const double* x, double* 
 void BlockProduct::addColumn(const BlockMatrix& matrix, int vertex, const Vec3& change, double* y) const {
     const auto add = [&](int row, const Vec3& by) { Eigen::Map<Vec3>(y + 3 * row) += by; };
     add(vertex, matrix.diagonal()[vertex] * change);
-    for (int k = m_lowerStart[vertex]; k < m_lowerStart[vertex + 1]; ++k)
-        add(m_lowerColumn[k], matrix.lower()[k].transpose() * change);
+    for (int k = matrix.rowBegin(vertex); k < matrix.rowEnd(vertex); ++k)
+        add(matrix.column(k), matrix.lower()[k].transpose() * change);
     for (int k = m_upperStart[vertex]; k < m_upperStart[vertex + 1]; ++k)
         add(m_upperRow[k], matrix.lower()[m_upperSlot[k]] * change);
     if (!matrix.beside()) return;

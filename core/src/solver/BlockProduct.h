@@ -18,7 +18,6 @@ class BlockProduct {
     void addColumn(const BlockMatrix& matrix, int vertex, const Vec3& change, double* y) const;
 
   private:
-    std::vector<int> m_lowerStart, m_lowerColumn;            ///< blocks of each row
     std::vector<int> m_upperStart, m_upperRow, m_upperSlot;  ///< of each column: rows, and indices in lower()
 };
 
