@@ -105,16 +105,17 @@ struct IslandSolver::Impl {
     std::vector<int> offsets, dynamicIndex;
     std::vector<int> dynamicBodies;  ///< index in IslandInput.bodies of each dynamic body
     Points v, start, y;              ///< all shells
-    Points from;                     ///< velocities that the step's momentum starts from (BDF2: not `start`)
+    Points twoStepFrom;              ///< see from(); of BDF2 alone
+    bool isTwoStep = false;          ///< whether some shell takes a step of BDF2
     std::vector<double> stepOf;      ///< of each shell, as its integrator counts it [s]
     std::vector<char> factored;      ///< shells: completely
     bool givesWay = true;            ///< false, as long as anything touches: see pushesStrain
     Points lastChange;               ///< dv of the last step
     Points expected;                 ///< velocities if that goes on
-    Points unfiltered;               ///< (b - A v) at the solution, soft rows included
     CoupledVector u;
     Points guess, reached;       ///< velocities: what a solve starts from, and what the last one led to
     Points newtonFrom, calmest;  ///< where the last Newton step was linearised, and where one that gained least was
+    Points& rigid = newtonFrom;  ///< velocities of shells that do not deform: asked for once Newton steps are over
     std::vector<CoupledSystem::ShellPart> parts;
     BodyVectors freeTwist, guessTwist;
     BodyVectors twistChange;  ///< of the bodies' twists, by the shells
@@ -124,7 +125,6 @@ struct IslandSolver::Impl {
     double reference = -1.0;                     ///< r^T P^-1 r that the tolerance refers to; < 0: not known
     int lastRounds = 1;                          ///< changes of the contacts in the last step, and one
     mutable std::vector<Points> at;              ///< where velocities lead each shell
-    Points rigid;                                ///< velocities of shells that do not deform
     mutable std::vector<double> elasticAtStart;  ///< of each shell at the start of the step; NaN: not yet asked for [J]
     StepTimes times;                             ///< of the step so far
     StepReport lastReport;
@@ -136,6 +136,10 @@ struct IslandSolver::Impl {
     void beginContacts(const IslandInput& input);
     void beginTwoStep(const IslandInput& input, std::size_t shell);
     void assemble(const IslandInput& input, bool atEnd);
+    /// Velocities that the step's momentum starts from (BDF2: not `start`).
+    const Points& from() const { return isTwoStep ? twoStepFrom : start; }
+    /// (b - A v) at the solution, soft rows included.
+    const Points& unfiltered() const { return pcg.unfilteredResidual(); }
     bool isAnyFactored() const { return std::count(factored.begin(), factored.end(), 0) < std::ssize(factored); }
     void readFreeTwists();
     bool overstretches(const IslandInput& input, bool isAgain) const;
@@ -195,13 +199,13 @@ const StepReport& IslandSolver::solve(const IslandInput& input) {
         s.solveStep(input, report);
     }
     report.times = s.times;
-    if (!s.u.allFinite() || !s.unfiltered.allFinite()) {  // state untouched; the caller decides
+    if (!s.u.allFinite() || !s.unfiltered().allFinite()) {  // state untouched; the caller decides
         report.finite = report.converged = false;
         return report;
     }
     if (!s.dynamicBodies.empty()) s.limitBodies(input, report);
     LapTimer closing(input);
-    report.passed = s.response.passes({s.v, s.endTwists(), s.unfiltered}, s.y);
+    report.passed = s.response.passes({s.v, s.endTwists(), s.unfiltered()}, s.y);
     closing.addTo(report.times.contact);
     report.settled = !s.unsettled;
     report.mayPass = s.response.hasFastBody() && (report.limited || s.unsettled);
@@ -224,7 +228,7 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
         count += shell->vertexCount();
     }
     start.resize(3, count);
-    for (Points* seldomUsed : {&rigid, &newtonFrom, &calmest}) seldomUsed->resize(3, count);
+    for (Points* seldomUsed : {&newtonFrom, &calmest}) seldomUsed->resize(3, count);
     at.resize(std::max(at.size(), input.shells.size()));
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const int n = input.shells[k]->vertexCount();
@@ -232,7 +236,7 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
         at[k].resize(3, n);
     }
     y.setZero(3, count);
-    from = start;
+    isTwoStep = false;
     stepOf.assign(input.shells.size(), input.h);
     elasticAtStart.assign(input.shells.size(), std::numeric_limits<double>::quiet_NaN());
     for (std::size_t k = 0; k < input.shells.size(); ++k)
@@ -268,9 +272,11 @@ void IslandSolver::Impl::beginTwoStep(const IslandInput& input, std::size_t k) {
     if (shell.settings().integrator != Integrator::Bdf2 || !(shell.m_lastH > 0.0)) return;
     const double r = input.h / shell.m_lastH, scale = 1.0 / (1.0 + 2.0 * r);
     const double now = (1.0 + r) * (1.0 + r) * scale, before = -r * r * scale;
+    if (!isTwoStep) twoStepFrom = start;
+    isTwoStep = true;
     shell.m_stride = (1.0 + r) * scale;
     stepOf[k] = shell.m_stride * input.h;
-    from.middleCols(offsets[k], shell.vertexCount()) = now * shell.velocities() + before * shell.m_lastV;
+    twoStepFrom.middleCols(offsets[k], shell.vertexCount()) = now * shell.velocities() + before * shell.m_lastV;
     y.middleCols(offsets[k], shell.vertexCount()) = (now - 1.0) * shell.positions() + before * shell.m_lastX;
 }
 
@@ -290,7 +296,7 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
     for (int newton = 1;; ++newton) {
         if (newton > 1) newtonFrom = v;  // most steps are over after the first
         solveRounds(input, report);
-        if (!unfiltered.allFinite()) return;
+        if (!unfiltered().allFinite()) return;
         const bool goOn = toTheEnd ? newton == 1 || improves(input) : overstretches(input, newton > 1);
         if (!goOn) return;
         if (const double gain = energyGain(input); gain < leastGain) {
@@ -308,7 +314,7 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
         solveRounds(input, report);
     }
     const double mostGain = response.hasFastBody() && bodiesLead(input) ? kMostGainOfFast : kMostEnergyGain;
-    if (unfiltered.allFinite() && energyGain(input) > mostGain) limitDeformation(input, report);
+    if (unfiltered().allFinite() && energyGain(input) > mostGain) limitDeformation(input, report);
 }
 
 /// After one more Newton step: goes back along it until the incremental potential is not above what it was, and says
@@ -340,7 +346,7 @@ double IslandSolver::Impl::incrementalPotential(const IslandInput& input, const 
         const Shell& shell = *input.shells[k];
         const int n = shell.vertexCount();
         const auto part = velocities.middleCols(offsets[k], n);
-        const auto since = part - from.middleCols(offsets[k], n);
+        const auto since = part - from().middleCols(offsets[k], n);
         for (int i = 0; i < n; ++i)
             sum += shell.masses()[i] * (0.5 * since.col(i).squaredNorm() - stepOf[k] * input.gravity.dot(part.col(i))) -
                    stepOf[k] * shell.forces().col(i).dot(part.col(i));
@@ -549,7 +555,7 @@ bool IslandSolver::Impl::bodiesLead(const IslandInput& input) const {
 /// Of a shell at the start of the step, or what gravity would give it in one [J].
 double IslandSolver::Impl::energyOfMotion(const IslandInput& input, std::size_t k) const {
     const Eigen::VectorXd& masses = input.shells[k]->masses();
-    const auto before = from.middleCols(offsets[k], input.shells[k]->vertexCount());
+    const auto before = from().middleCols(offsets[k], input.shells[k]->vertexCount());
     return 0.5 * masses.dot(before.colwise().squaredNorm().transpose()) +
            0.5 * masses.sum() * (stepOf[k] * input.gravity).squaredNorm();
 }
@@ -563,7 +569,7 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
         const Shell& shell = *input.shells[k];
         const int n = shell.vertexCount();
         const auto part = v.middleCols(offsets[k], n);
-        const auto before = from.middleCols(offsets[k], n);
+        const auto before = from().middleCols(offsets[k], n);
         if (shell.pressure() != 0.0) return 0.0;
         for (int i = 0; i < n; ++i) {
             const Vec3 mean = 0.5 * (part.col(i) + before.col(i));
@@ -589,7 +595,7 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
     double fastest2 = 0.0;
     for (const auto& held : system.constraints()) {  // work of pins and bodies that are moved
         if (held.body >= 0) continue;
-        gain -= std::max(0.0, -unfiltered.col(held.vertex).dot(held.carried));
+        gain -= std::max(0.0, -unfiltered().col(held.vertex).dot(held.carried));
         fastest2 = std::max(fastest2, held.carried.squaredNorm());
     }
     for (const auto& row : system.rows()) {
@@ -611,7 +617,7 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
         const int n = input.shells[k]->vertexCount();
         const Eigen::Ref<const Points> ahead = (atEnd ? v : start).middleCols(offsets[k], n);
         const StepSystem& step = input.shells[k]->m_assembly->assemble(
-            *input.shells[k], stepOf[k], input.gravity, input.wind, from.middleCols(offsets[k], n),
+            *input.shells[k], stepOf[k], input.gravity, input.wind, from().middleCols(offsets[k], n),
             y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr, team);
         parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions(), factored[k] != 0,
                          isIncomplete && !factored[k] && n >= kLeastCompact});
@@ -675,7 +681,6 @@ PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, 
     report.pcgIterations += solve.iterations;
     report.residual = solve.residual * std::sqrt(target2 / reference);
     report.converged = solve.converged;
-    unfiltered = pcg.unfilteredResidual();
     return solve;
 }
 
@@ -720,10 +725,10 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         writing.addTo(times.contact);
         solveRound(input, roughly, freshIterations, report);
         LapTimer lap(input);
-        if (!u.allFinite() || !unfiltered.allFinite()) return;
+        if (!u.allFinite() || !unfiltered().allFinite()) return;
         system.velocities(u, v);
         lap.addTo(times.solve);
-        const bool changed = response.update(system, {v, u.w, unfiltered}, y, round, roughly);
+        const bool changed = response.update(system, {v, u.w, unfiltered()}, y, round, roughly);
         lap.addTo(times.contact);
         // What stiff shells do while their contacts are not settled would tip a body off what bears it.
         const bool isTelling = !preconditioner.isComplete() || (!changed && !response.isLast(round));
@@ -780,7 +785,7 @@ void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
 /// bowl on its rim.
 bool IslandSolver::Impl::pushesStrain(const IslandInput& input) {
     constexpr double kMost = kMostEnergyGain;
-    if (!response.isQuick() || !unfiltered.allFinite()) return false;
+    if (!response.isQuick() || !unfiltered().allFinite()) return false;
     const auto& pushes = response.pushes(v);
     const auto energyAfter = [&] {
         double sum = 0.0;
@@ -828,7 +833,7 @@ void IslandSolver::Impl::balance(const IslandInput& input, std::vector<ContactIm
     }
     std::pmr::vector<Vec3> onShells(input.shells.size(), Vec3::Zero(), &pool);
     for (const auto& anchor : input.anchors) {
-        const Vec3 impulse = -impulseShare * unfiltered.col(offsets[anchor.shell] + anchor.vertex);
+        const Vec3 impulse = -impulseShare * unfiltered().col(offsets[anchor.shell] + anchor.vertex);
         onBodies[anchor.body] -= pointImpulse(impulse, anchor.point - input.bodies[anchor.body].position);
         onShells[anchor.shell] += impulse;
     }
@@ -850,7 +855,7 @@ void IslandSolver::Impl::shift(const IslandInput& input, std::span<const Vec3> o
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         if (shell.pinCount() > 0) continue;
-        Vec3 given = -unfiltered.middleCols(offsets[k], shell.vertexCount()).rowwise().sum();
+        Vec3 given = -unfiltered().middleCols(offsets[k], shell.vertexCount()).rowwise().sum();
         for (const auto& row : system.rows())
             if (row.vertices[0] >= offsets[k] && row.vertices[0] < offsets[k] + shell.vertexCount())
                 given += system.rowImpulse(row, reached, u.w);

@@ -42,7 +42,6 @@ void CoupledSystem::begin(const std::vector<ShellPart>& shells, int vertexCount,
     m_vertexCount = vertexCount;
     setBodies(mass, freeTwist, couplings);
     m_v.resize(3, vertexCount);
-    m_q.resize(3, vertexCount);
     m_constraintOf.assign(vertexCount, -1);
     m_constraints.clear();
     m_rows.clear();
@@ -149,6 +148,7 @@ void CoupledSystem::apply(const CoupledVector& u, CoupledVector& q) const {
     m_v = u.s;
     for (const auto& c : m_constraints)
         if (c.body >= 0) m_v.col(c.vertex) += c.tie * pointVelocity(u.w.col(c.body), c.arm);
+    m_q.resize(3, m_vertexCount);
     multiply(m_v, m_q);
     momentum(u.w, q.w);
     for (const auto& row : m_rows) {
