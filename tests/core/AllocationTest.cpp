@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include "EdgeStretch.h"
 #include "ShellAssembly.h"
@@ -76,6 +77,31 @@ TEST(Allocation, OfAStepIsTheSameWithATeam) {
         return allocations - before;
     };
     EXPECT_EQ(ofTheThirdStep(&team), ofTheThirdStep(nullptr));
+}
+
+/// Bytes that have been asked for and not given back.
+std::size_t heapInUse() {
+    const struct mallinfo2 heap = mallinfo2();
+    return heap.uordblks + heap.hblkhd;
+}
+
+/// Of a cloth with what its solver keeps, without contacts; matrices and factors are most of it.
+TEST(Memory, OfAVertexOfClothIsBounded) {
+    constexpr int kCells = 70;
+    constexpr std::size_t kMostOfAVertex = 3500;
+    const std::size_t before = heapInUse();
+    Shell shell(makeGrid({.size = {1, 1}, .cells = {kCells, kCells}}),
+                {.young = 1e6, .thickness = 1e-3, .density = 200.0});
+    for (int i = 0; i <= kCells; ++i) shell.pin(i);
+    Shell* const shells[] = {&shell};
+    IslandSolver solver;
+    for (int step = 0; step < 3; ++step) {
+        IslandInput input;
+        input.shells = shells;
+        EXPECT_TRUE(solver.solve(input).finite);
+        shell.advance(input.h);
+    }
+    EXPECT_LT((heapInUse() - before) / shell.vertexCount(), kMostOfAVertex);
 }
 
 TEST(Allocation, IsCounted) {
