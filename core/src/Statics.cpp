@@ -80,10 +80,7 @@ void StaticSolver::assemble(double load, HessianKind kind) {
         for (int s = k.rowBegin(i); s < k.rowEnd(i); ++s) add(i, k.column(s), k.lower()[s]);
         m_force.segment(m_offsets[i], m_basis[i].cols()) = m_basis[i].transpose() * system.rhs.col(i);
     }
-    const auto scalars = k.beside() ? k.beside()->beside() : ConstantHessian::Rows{};
-    for (int i = 0; scalars.start && i < k.size(); ++i)
-        for (int s = scalars.start[i]; s < scalars.start[i + 1] && scalars.column[s] < i; ++s)
-            add(i, scalars.column[s], k.besideFactor() * scalars.value[s] * Mat3::Identity());
+    forBeside(k, [&](int i, int j, double scalar) { add(i, j, k.besideFactor() * scalar * Mat3::Identity()); });
     m_matrix.resize(m_size, m_size);
     m_matrix.setFromTriplets(entries.begin(), entries.end());
 }

@@ -34,6 +34,10 @@ struct ConstantRows {
     int count;
 };
 
+ConstantRows rowsTimes(const Eigen::Matrix<double, 4, Eigen::Dynamic>& x, const ConstantHessian& scalars) {
+    return {scalars.inside(), scalars.beside(), x.data(), static_cast<int>(x.cols())};
+}
+
 using Scalars = ConstantHessian::Rows;
 
 JACKET_INLINE void addDifference(const Scalars& scalars, int k, const double* x, const double* xi, double (&sum)[4]) {
@@ -334,8 +338,7 @@ double PatchEnergy::flatValue(const Points& x) const {
     mean = first + mean / static_cast<double>(x.cols());
     const Mat3 map = moments * m_inverseMoments;
     for (int i = 0; i < x.cols(); ++i) m_padded.col(i).head<3>() = x.col(i) - mean - map * m_flatRest.col(i);
-    return 0.5 *
-           constantProduct({m_constant.inside(), m_constant.beside(), m_padded.data(), static_cast<int>(x.cols())});
+    return 0.5 * constantProduct(rowsTimes(m_padded, m_constant));
 }
 
 /// Of a mirrored patch, whose share the constant Hessian does not have.
@@ -356,7 +359,7 @@ void PatchEnergy::pad(const Points& x) const {
 
 void PatchEnergy::addGradient(const Points& x, Points& gradient) const {
     pad(x);
-    const ConstantRows rows{m_constant.inside(), m_constant.beside(), m_padded.data(), static_cast<int>(x.cols())};
+    const ConstantRows rows = rowsTimes(m_padded, m_constant);
     addConstantGradient(rows, 0, rows.count, 1.0, gradient.data());
     const auto add = [&](int vertex, const Vec3& g) { gradient.col(vertex) += g; };
     for (const Element& e : m_elements) {
@@ -370,7 +373,7 @@ void PatchEnergy::addGradient(const Points& x, Points& gradient) const {
 void PatchEnergy::addTo(StepSystem& system, const Points& x, HessianKind kind) const {
     pad(x);
     const TermSink sink = system.sink();
-    const ConstantRows rows{m_constant.inside(), m_constant.beside(), m_padded.data(), static_cast<int>(x.cols())};
+    const ConstantRows rows = rowsTimes(m_padded, m_constant);
     runRanges(system.team(), static_cast<int>(x.cols()), kRowsAtATime,
               [&](int begin, int end) { addConstantGradient(rows, begin, end, sink.gradientFactor, sink.rhs); });
     for (const Element& e : m_elements) {

@@ -65,4 +65,13 @@ class BlockMatrix {
     mutable std::unique_ptr<CompactShell> m_compact;
 };
 
+/// Calls `visit(i, j, scalar)`, i > j, for what stands beside the blocks; besideFactor() is not in it.
+void forBeside(const BlockMatrix& matrix, const auto& visit) {
+    if (!matrix.beside()) return;
+    const auto scalars = matrix.beside()->beside();
+    for (int i = 0; i < matrix.size(); ++i)
+        for (int k = scalars.start[i]; k < scalars.start[i + 1] && scalars.column[k] < i; ++k)
+            visit(i, scalars.column[k], scalars.value[k]);
+}
+
 }  // namespace jacket

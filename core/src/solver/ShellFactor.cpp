@@ -9,15 +9,6 @@ constexpr double kLeast = 1e-14;  ///< of a direction's stiffness: less left ove
 
 using Neighbours = std::vector<std::vector<int>>;
 
-/// Calls `visit(i, j)`, i > j, for what stands beside the blocks of a matrix.
-void forBeside(const BlockMatrix& matrix, const auto& visit) {
-    if (!matrix.beside()) return;
-    const auto scalars = matrix.beside()->beside();
-    for (int i = 0; i < matrix.size(); ++i)
-        for (int k = scalars.start[i]; k < scalars.start[i + 1] && scalars.column[k] < i; ++k)
-            visit(i, scalars.column[k], scalars.value[k]);
-}
-
 /// Calls `visit(i, j, k)`, i > j, for block k of a matrix.
 void forLower(const BlockMatrix& matrix, const auto& visit) {
     for (int i = 0; i < matrix.size(); ++i)
