@@ -164,7 +164,8 @@ struct IslandSolver::Impl {
     PcgReport solveOnce(const IslandInput& input, bool roughly, int maxIterations, StepReport& report);
     void solveRound(const IslandInput& input, bool roughly, int& freshIterations, StepReport& report);
     void solveRounds(const IslandInput& input, StepReport& report);
-    void store(const IslandInput& input, StepReport& report);
+    bool store(const IslandInput& input, StepReport& report);
+    bool isFinite(const IslandInput& input) const;
     bool pushesStrain(const IslandInput& input);
     void pushOut(const IslandInput& input, StepReport& report);
     void balance(const IslandInput& input, std::vector<ContactImpulse>& impulses);
@@ -209,7 +210,7 @@ const StepReport& IslandSolver::solve(const IslandInput& input) {
     closing.addTo(report.times.contact);
     report.settled = !s.unsettled;
     report.mayPass = s.response.hasFastBody() && (report.limited || s.unsettled);
-    s.store(input, report);  // velocities, twists, reactions
+    if (!s.store(input, report)) report.finite = report.converged = false;  // velocities, twists, reactions
     return report;
 }
 
@@ -747,7 +748,8 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
     unsettled |= !response.isQuick() && response.isLast(round);
 }
 
-void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
+/// What was solved goes to the bodies and then to the shells, unless it is not finite: false.
+bool IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
     response.finish(report.contacts);
     if (impulseShare == 0.0) report.contacts.clear();
     const BodyVectors& twists = endTwists();
@@ -765,6 +767,10 @@ void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
     }
     balance(input, report.contacts);
     if (!report.limited) pushOut(input, report);
+    if (!isFinite(input)) {
+        report.contacts.clear();
+        return false;
+    }
     report.deepestGap = response.deepestGap();
     if (report.deepestGap < -20.0 * response.slop()) report.converged = false;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
@@ -779,6 +785,12 @@ void IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
         shell.m_v = v.middleCols(offsets[k], n);
         shell.m_y = y.middleCols(offsets[k], n);
     }
+    return true;
+}
+
+bool IslandSolver::Impl::isFinite(const IslandInput& input) const {
+    const auto isGiven = [](const CoupledBody& b) { return b.twist.allFinite() && b.impulse.allFinite(); };
+    return v.allFinite() && y.allFinite() && std::all_of(input.bodies.begin(), input.bodies.end(), isGiven);
 }
 
 /// Whether pushOut would strain the shells, which then do not give way to it: sheet metal that stands on its edge, a
@@ -841,7 +853,7 @@ void IslandSolver::Impl::balance(const IslandInput& input, std::vector<ContactIm
         if (input.bodies[b].prescribed || !(pressed[b] > 0.0)) input.bodies[b].impulse = onBodies[b];
     for (auto& [contact, impulse, sticks, slip] : impulses) {
         const Vec3 missing = input.bodies[contact.body].impulse.head<3>() - onBodies[contact.body].head<3>();
-        impulse -= missing * (impulse.norm() / pressed[contact.body]);
+        if (pressed[contact.body] > 0.0) impulse -= missing * (impulse.norm() / pressed[contact.body]);
         onShells[contact.shell] += impulse;
     }
     shift(input, onShells, impulses);

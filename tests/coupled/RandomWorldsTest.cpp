@@ -19,7 +19,7 @@ TEST_P(RandomWorlds, GainNoEnergy) {
     EXPECT_LT(outcome.deepest, 5e-3) << outcome.what;
 }
 
-INSTANTIATE_TEST_SUITE_P(Drawn, RandomWorlds, ::testing::Values(37u, 63u, 79u, 80u, 88u),
+INSTANTIATE_TEST_SUITE_P(Drawn, RandomWorlds, ::testing::Values(37u, 63u, 79u, 80u, 88u, 177u),
                          [](const auto& world) { return std::to_string(world.param); });
 
 }  // namespace
