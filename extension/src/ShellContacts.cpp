@@ -180,10 +180,11 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
     std::vector<TrianglePoint> faces;
     for (int t = 0; t < mesh.triangleCount(); ++t) {
         Mat3 triangle;
-        std::array<bool, 3> edges;
+        std::array<ShellEdge, 3> edges;
         for (int a = 0; a < 3; ++a) {
             triangle.col(a) = x.col(mesh.triangles()(a, t));
-            edges[a] = mesh.twin(3 * t + a) < 3 * t + a;  // the other triangle has the rest
+            const int twin = mesh.twin(3 * t + a);  // its triangle asks about the edge if it comes first
+            edges[a] = twin < 0 ? ShellEdge::kBorder : twin < 3 * t + a ? ShellEdge::kShared : ShellEdge::kLeftOut;
         }
         faces.clear();
         patch->touch(triangle, edges, faceReach, depth, faces);

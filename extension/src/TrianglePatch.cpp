@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kFlat = 1e-4;      // sine of the bend below which an edge is no ridge
 constexpr double kParallel = 0.02;  // sine of the angle below which two edges do not cross
+constexpr double kAcross = 0.5;     // cosine of the angle to a triangle's normal beyond which its edges are not pushed
 constexpr double kCone = 1e-6;      // how far, relative, a neighbour may stand out over a tip or a ridge
 
 bool mirrors(const btVector3& scaling) {
@@ -291,7 +292,8 @@ std::optional<TrianglePoint> TrianglePatch::touchTip(int index, const FaceQuery&
     return TrianglePoint{{tip.point, n, n.dot(b.point - tip.point)}, b.weights};
 }
 
-std::optional<TrianglePoint> TrianglePatch::touchRidge(const Ridge& ridge, const FaceQuery& query, int side) const {
+std::optional<TrianglePoint> TrianglePatch::touchRidge(const Ridge& ridge, const FaceQuery& query, int side,
+                                                       ShellEdge edge) const {
     const int next = (side + 1) % 3;
     const Vec3 start = query.triangle.col(side), along = query.triangle.col(next) - start;
     Vec3 n = along.cross(ridge.along);
@@ -299,6 +301,8 @@ std::optional<TrianglePoint> TrianglePatch::touchRidge(const Ridge& ridge, const
     if (!(std::abs(length) > kParallel * along.norm() * ridge.along.norm())) return std::nullopt;
     n /= length;
     if (n.dot(ridge.inward[0]) > kCone || n.dot(ridge.inward[1]) > kCone) return std::nullopt;
+    const bool isInto = edge == ShellEdge::kBorder && n.dot(query.triangle.col((side + 2) % 3) - start) > 0;
+    if (!isInto && std::abs(n.dot(query.normal)) < kAcross) return std::nullopt;
     const double distance = n.dot(start - ridge.start);  // of the two lines
     if (!query.isNear(distance)) return std::nullopt;
     const auto [s, t] = closestOfSegments(start, start + along, ridge.start, ridge.start + ridge.along);
@@ -309,7 +313,7 @@ std::optional<TrianglePoint> TrianglePatch::touchRidge(const Ridge& ridge, const
     return TrianglePoint{{ridge.start + t * ridge.along, n, distance}, weights};
 }
 
-void TrianglePatch::touch(const Mat3& triangle, const std::array<bool, 3>& edges, double reach, double depth,
+void TrianglePatch::touch(const Mat3& triangle, const std::array<ShellEdge, 3>& edges, double reach, double depth,
                           std::vector<TrianglePoint>& touched) const {
     const FaceQuery query{triangle, triangleNormal(triangle), reach, depth};
     std::array<std::optional<TrianglePoint>, 4> deepest;  // of the edges, of the inside
@@ -322,7 +326,8 @@ void TrianglePatch::touch(const Mat3& triangle, const std::array<bool, 3>& edges
                       [&](int index) {
                           const Ridge& ridge = m_ridges[index];
                           for (int side = 0; side < 3; ++side)
-                              if (edges[side]) offer(side, touchRidge(ridge, query, side));
+                              if (edges[side] != ShellEdge::kLeftOut)
+                                  offer(side, touchRidge(ridge, query, side, edges[side]));
                           for (const int tip : ridge.tips)
                               if (tip >= 0) offer(3, touchTip(tip, query));
                       });

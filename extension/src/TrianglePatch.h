@@ -11,6 +11,10 @@ class btConcaveShape;
 
 namespace jacket::bullet {
 
+/// How the edge of a shell's triangle is asked about: two triangles share each, and one of them is enough. What two
+/// triangles share is pushed across them; a border also into its triangle.
+enum class ShellEdge { kLeftOut, kShared, kBorder };
+
 /// The triangles of a concave shape that lie near a shell, in the shape's frame.
 ///
 /// The surface is that of the triangles themselves, without Bullet's margin, and one-sided: a point behind it is pushed
@@ -31,10 +35,9 @@ class TrianglePatch {
     void touch(const Vec3& p, double reach, double depth, std::vector<SurfacePoint>& touched) const;
 
     /// Appends where a corner of the surface meets the inside of a triangle, and where ridges meet its edges: the
-    /// deepest such place of the inside and of each edge, at most `reach` apart or `depth` deep. Only edges (from
-    /// corner i to the next) with a true entry in `edges` are looked at, for two triangles share each. The triangle's
-    /// own corners are left to touch() of points.
-    void touch(const Mat3& triangle, const std::array<bool, 3>& edges, double reach, double depth,
+    /// deepest such place of the inside and of each edge, at most `reach` apart or `depth` deep. `edges`: from corner i
+    /// to the next. The triangle's own corners are left to touch() of points.
+    void touch(const Mat3& triangle, const std::array<ShellEdge, 3>& edges, double reach, double depth,
                std::vector<TrianglePoint>& touched) const;
 
   private:
@@ -80,7 +83,7 @@ class TrianglePatch {
         bool isNear(double distance) const { return distance <= reach && distance >= -depth; }
     };
     std::optional<TrianglePoint> touchTip(int corner, const FaceQuery& query) const;
-    std::optional<TrianglePoint> touchRidge(const Ridge& ridge, const FaceQuery& query, int side) const;
+    std::optional<TrianglePoint> touchRidge(const Ridge& ridge, const FaceQuery& query, int side, ShellEdge edge) const;
 
     Bounds m_box;
     std::vector<Corner> m_corners;

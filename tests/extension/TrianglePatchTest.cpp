@@ -17,6 +17,9 @@ namespace jacket::bullet {
 namespace {
 
 using testing::Random;
+using enum ShellEdge;
+
+constexpr std::array kBorders{kBorder, kBorder, kBorder};
 
 constexpr double kAccuracy = sizeof(btScalar) == sizeof(float) ? 1e-6 : 1e-12;
 
@@ -126,7 +129,7 @@ TEST(TrianglePatch, TipsAreAsDeepAsTheyStickOut) {
             Vec3(shift.x() + 2 * scale, y, shift.z() - 2 * scale);
         if (i % 2) triangle.col(0).swap(triangle.col(1));  // of either orientation
         std::vector<TrianglePoint> touched;
-        patch.touch(triangle, {true, true, true}, 0.25 * height, 0.4 * height, touched);
+        patch.touch(triangle, kBorders, 0.25 * height, 0.4 * height, touched);
         ASSERT_EQ(touched.size(), 1u);
         EXPECT_NEAR(touched[0].surface.distance, -depth, kAccuracy * height);
         EXPECT_NEAR(touched[0].surface.normal.y(), 1, 1e-9);
@@ -150,15 +153,40 @@ TEST(TrianglePatch, EdgesAcrossARidgeAreAsDeepAsTheyCutIt) {
         triangle << Vec3(-0.5 * scale, y, -slant * scale), Vec3(0.5 * scale, y, slant * scale),
             Vec3(0.1 * scale, 0.8 * scale, 0);
         std::vector<TrianglePoint> touched;
-        patch.touch(triangle, {true, false, false}, 0, 0.1 * scale, touched);
+        patch.touch(triangle, {kBorder, kLeftOut, kLeftOut}, 0, 0.1 * scale, touched);
         ASSERT_EQ(touched.size(), 1u) << y / scale << " " << left << " " << right;
         EXPECT_NEAR(touched[0].surface.distance, y, kAccuracy * scale);
         EXPECT_NEAR(touched[0].surface.normal.y(), 1, 1e-9);
         EXPECT_EQ(touched[0].weights.z(), 0);
         touched.clear();
-        patch.touch(triangle, {false, true, true}, 0, 0.1 * scale, touched);
+        patch.touch(triangle, {kLeftOut, kBorder, kBorder}, 0, 0.1 * scale, touched);
         EXPECT_TRUE(touched.empty());
     }
+}
+
+/// A level triangle whose first edge passes inside a post, beside its upright ridge and deeper below its upper ones
+/// than from that. What the sheet goes on beyond is pushed up, not along itself; where it ends it may be pushed aside.
+TEST(TrianglePatch, SharedEdgesAreNotPushedAlongTheirSheet) {
+    Soup soup;  // the post's upper corner is at the origin, it stands in x < 0, z < 0
+    const Vec3 corner(0, 0, 0), foot(0, -9, 0), left(-9, 0, 0), back(0, 0, -9);
+    soup.add(corner, back, left);
+    soup.add(corner, left, foot);
+    soup.add(corner, foot, back);
+    const TrianglePatch patch = soup.patch(20);
+    Mat3 triangle;
+    triangle << Vec3(-1.2, -0.8, 1), Vec3(1, -0.8, -1.2), Vec3(2, -0.8, 2);
+    std::vector<TrianglePoint> touched;
+    patch.touch(triangle, {kBorder, kLeftOut, kLeftOut}, 0, 0.5, touched);
+    ASSERT_EQ(touched.size(), 1u);
+    EXPECT_NEAR(touched[0].surface.normal.y(), 0, 1e-9);
+    EXPECT_NEAR(touched[0].surface.distance, -0.1 * std::sqrt(2), 1e-6);
+    touched.clear();
+    patch.touch(triangle, {kShared, kLeftOut, kLeftOut}, 0, 0.5, touched);
+    EXPECT_TRUE(touched.empty());
+    patch.touch(triangle, {kShared, kLeftOut, kLeftOut}, 0, 2, touched);
+    ASSERT_EQ(touched.size(), 1u);
+    EXPECT_NEAR(touched[0].surface.normal.y(), 1, 1e-9);
+    EXPECT_NEAR(touched[0].surface.distance, -0.8, 1e-6);
 }
 
 TEST(TrianglePatch, AFlatFloorHasNothingForFacesAndOneNormalForPoints) {
@@ -187,7 +215,7 @@ TEST(TrianglePatch, AFlatFloorHasNothingForFacesAndOneNormalForPoints) {
     Mat3 triangle;
     triangle << Vec3(-0.2, 0.29, -0.2), Vec3(-0.1, 0.31, 0.2), Vec3(0.2, 0.29, 0);
     std::vector<TrianglePoint> faces;
-    patch.touch(triangle, {true, true, true}, 0.01, 0.05, faces);
+    patch.touch(triangle, kBorders, 0.01, 0.05, faces);
     EXPECT_TRUE(faces.empty());
 }
 
