@@ -41,6 +41,14 @@ Mat6 massOf(const btRigidBody& body) {
     return result;
 }
 
+/// Radius of a ball that fits into a shape of triangles, for all that is known of it [m].
+double innerRadiusOf(const btConcaveShape& shape) {
+    constexpr double kThickness = 0.5;  // of its bounds
+    btVector3 lower, upper;
+    shape.getAabb(btTransform::getIdentity(), lower, upper);
+    return 0.5 * kThickness * fromBullet(upper - lower).minCoeff();
+}
+
 }  // namespace
 
 Frame moved(const Frame& start, const Vec6& twist, double time) {
@@ -62,6 +70,9 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContact
     coupled.key = &object;
     for (const auto& piece : obstacle.shape->pieces)
         coupled.inner = std::min(coupled.inner, 0.5 * (piece->upper() - piece->lower()).minCoeff());
+    if (!object.isStaticOrKinematicObject())  // sheets that fly against what stands are seen from the start
+        for (const ConcavePiece& piece : obstacle.shape->concave)
+            coupled.inner = std::min(coupled.inner, innerRadiusOf(*piece.shape));
     const btRigidBody* rigid = btRigidBody::upcast(&object);
     if (const auto* link = btMultiBodyLinkCollider::upcast(&object)) {
         coupled.freeTwist = coupled.startTwist = twistOf(*link);

@@ -12,6 +12,8 @@
 
 namespace jacket::bullet {
 
+class SweepTarget;
+
 /// The contacts of an island's shells with the obstacles near them: what the solver asks for at any pose of one step.
 ///
 /// A vertex in a valley, between two pieces of a body or two triangles of one, has a contact with each. Feature ids are
@@ -29,6 +31,8 @@ class ShellContacts final : public ContactDetector {
   private:
     struct Query;
     struct Sweep;
+    void sweepPiece(const Sweep& sweep, const SweepTarget& target, std::vector<Contact>& contacts);
+    const TrianglePatch& wholeOf(const ConcavePiece& piece, double radius);
     void add(Query& query, int feature, const SurfacePoint& surface, const std::array<int, 3>& vertices,
              const Vec3& weights);
     void findVertices(Query& query, const ConvexPiece& piece);
@@ -54,6 +58,7 @@ class ShellContacts final : public ContactDetector {
     /// frame. Their index is part of a contact's id.
     std::pmr::vector<std::pmr::map<int, Sides>> m_sides;
     std::pmr::vector<std::vector<std::unique_ptr<TrianglePatch>>> m_patches;  ///< of each pair, of each concave piece
+    std::map<const ConcavePiece*, TrianglePatch> m_whole;                     ///< of the shapes of fast bodies
     std::pmr::vector<double> m_depth;  ///< of each pair: from how deep behind triangles a vertex is pushed out [m]
 };
 

@@ -7,10 +7,77 @@
 namespace jacket::bullet {
 namespace {
 
-constexpr int kMostAdvances = 60;  // of one triangle towards one piece; then the contact is taken where it is
-constexpr double kTouching = 0.3;  // of the contact thickness: closer than this they touch
-constexpr double kAtVertex = 0.9;  // weight of a corner beyond which a triangle's contact is that corner's
-constexpr double kShallow = 0.5;   // of the body: what goes in less than that is found at the end of the step
+constexpr int kMostAdvances = 60;   // of one triangle towards one piece; then the contact is taken where it is
+constexpr double kTouching = 0.3;   // of the contact thickness: closer than this they touch
+constexpr double kAtVertex = 0.9;   // weight of a corner beyond which a triangle's contact is that corner's
+constexpr double kShallow = 0.5;    // of the body: what goes in less than that is found at the end of the step
+constexpr double kSameTime = 0.02;  // of the step: a triangle that is hit so little before its corners needs no contact
+
+constexpr std::array<ShellEdge, 3> kAllEdges{ShellEdge::kBorder, ShellEdge::kBorder, ShellEdge::kBorder};
+
+Mat3 transformed(const Frame& frame, const Mat3& triangle) {
+    return (frame.linear() * triangle).colwise() + frame.translation();
+}
+
+}  // namespace
+
+/// What is swept against, in the body's frame.
+class SweepTarget {
+  public:
+    virtual ~SweepTarget() = default;
+    /// Where a triangle is nearest to it, a point if `isPoint`: all corners are the same then.
+    virtual std::optional<TrianglePoint> touch(const Mat3& triangle, bool isPoint) const = 0;
+    /// Whether the whole of it lies behind the plane through its nearest point.
+    virtual bool isConvex() const = 0;
+};
+
+namespace {
+
+class ConvexTarget final : public SweepTarget {
+  public:
+    explicit ConvexTarget(const ConvexPiece& piece) : m_piece(piece) {}
+    std::optional<TrianglePoint> touch(const Mat3& triangle, bool isPoint) const override {
+        constexpr double kAnyReach = std::numeric_limits<double>::max();
+        if (!isPoint) return m_piece.touch(triangle, kAnyReach);
+        const auto surface = m_piece.touch(Vec3(triangle.col(0)), kAnyReach);
+        return surface ? std::optional(TrianglePoint{*surface, Vec3::UnitX()}) : std::nullopt;
+    }
+    bool isConvex() const override { return true; }
+
+  private:
+    const ConvexPiece& m_piece;
+};
+
+/// The triangles of a concave piece; what is deeper than `depth` behind them is not touched.
+class ConcaveTarget final : public SweepTarget {
+  public:
+    ConcaveTarget(const TrianglePatch& patch, const Frame& frame, double depth)
+        : m_patch(patch), m_frame(frame), m_depth(depth) {}
+    std::optional<TrianglePoint> touch(const Mat3& triangle, bool isPoint) const override {
+        const Mat3 local = transformed(m_frame.inverse(Eigen::Isometry), triangle);
+        const Bounds& box = m_patch.box();
+        const double reach = (box.upper - box.lower).norm() + (local.col(0) - box.lower).norm();  // to any of it
+        TrianglePoint nearest{{{}, {}, reach}, {}};
+        for (int a = 0; a < (isPoint ? 1 : 3); ++a)
+            if (const auto corner = m_patch.touchNearest(local.col(a), nearest.surface.distance, m_depth))
+                if (corner->distance < nearest.surface.distance) nearest = {*corner, Vec3::Unit(a)};
+        m_touched.clear();
+        if (!isPoint) m_patch.touch(local, kAllEdges, std::max(0.0, nearest.surface.distance), m_depth, m_touched);
+        for (const TrianglePoint& inside : m_touched)
+            if (inside.surface.distance < nearest.surface.distance) nearest = inside;
+        if (nearest.surface.distance == reach) return std::nullopt;
+        nearest.surface.point = m_frame * nearest.surface.point;
+        nearest.surface.normal = m_frame.linear() * nearest.surface.normal;
+        return nearest;
+    }
+    bool isConvex() const override { return false; }
+
+  private:
+    const TrianglePatch& m_patch;
+    Frame m_frame;
+    double m_depth;
+    mutable std::vector<TrianglePoint> m_touched;
+};
 
 }  // namespace
 
@@ -19,7 +86,6 @@ struct ShellContacts::Sweep {
     const ShellBody& shell;
     const Points &start, &end;
     const Obstacle& obstacle;
-    const ConvexPiece& piece;
     Vec6 twist;
     double time;
 
@@ -29,7 +95,7 @@ struct ShellContacts::Sweep {
                    last = moved(obstacle.start, twist, time).translation();
         return {first.cwiseMin(last) - radius, first.cwiseMax(last) + radius};
     }
-    Bounds boundsOfTriangle(const std::array<int, 3>& corners) const {
+    Bounds boundsOf(const std::array<int, 3>& corners) const {
         Bounds bounds{start.col(corners[0]), start.col(corners[0])};
         for (const int i : corners)
             for (const Vec3& p : {Vec3(start.col(i)), Vec3(end.col(i))}) bounds.include({p, p});
@@ -45,86 +111,130 @@ struct ShellContacts::Sweep {
     Vec3 relativeVelocity(int vertex, const Vec3& centre, const Vec3& at) const {
         return (end.col(vertex) - start.col(vertex)) / time - twist.head<3>() - twist.tail<3>().cross(at - centre);
     }
-    std::optional<Contact> advance(const std::array<int, 3>& corners) const;
+    double closingSpeed(const SweepTarget& target, const std::array<int, 3>& corners, const Vec3& centre,
+                        const Mat3& triangle, const Vec3& normal) const;
+    std::optional<Contact> advance(const SweepTarget& target, const std::array<int, 3>& corners) const;
+    std::optional<Contact> contactAt(double t, const TrianglePoint& touch, const std::array<int, 3>& corners) const;
 };
 
+/// How fast any of the corners may come nearer to the target, but for the body's spin [m/s].
+double ShellContacts::Sweep::closingSpeed(const SweepTarget& target, const std::array<int, 3>& corners,
+                                          const Vec3& centre, const Mat3& triangle, const Vec3& normal) const {
+    double closing = 0.0;
+    for (int a = 0; a < 3; ++a) {
+        const Vec3 velocity = relativeVelocity(corners[a], centre, triangle.col(a));
+        closing = std::max(closing, target.isConvex() ? -normal.dot(velocity) : velocity.norm());
+    }
+    return closing;
+}
+
 /// Conservative advancement (Mirtich 1996): as far in time as the distance allows at the largest closing speed, again
-/// and again, until they touch or the step is over.
-std::optional<Contact> ShellContacts::Sweep::advance(const std::array<int, 3>& corners) const {
+/// and again, until they touch or the step is over. For a vertex all corners are the same.
+std::optional<Contact> ShellContacts::Sweep::advance(const SweepTarget& target,
+                                                     const std::array<int, 3>& corners) const {
     const double thickness = shell.contactThickness(), spin = twist.tail<3>().norm() * obstacle.body.radius;
+    const bool isPoint = corners[0] == corners[1];
     double t = 0.0;
     for (int i = 0;; ++i) {
         const Frame frame = moved(obstacle.start, twist, t);
-        const Frame toBody = frame.inverse(Eigen::Isometry);
         const Mat3 triangle = triangleAt(corners, t);
-        Mat3 local;
-        for (int a = 0; a < 3; ++a) local.col(a) = toBody * Vec3(triangle.col(a));
-        const auto touch = piece.touch(local, std::numeric_limits<double>::max());
+        const auto touch = target.touch(transformed(frame.inverse(Eigen::Isometry), triangle), isPoint);
         if (!touch) return std::nullopt;
         if (i == 0 && touch->surface.distance < 0.0) return std::nullopt;  // there from the start: not of this motion
-        const Vec3 normal = frame.linear() * touch->surface.normal;
-        double closing = 0.0;
-        for (int a = 0; a < 3; ++a)
-            closing =
-                std::max(closing, -normal.dot(relativeVelocity(corners[a], frame.translation(), triangle.col(a))));
+        const double closing =
+            closingSpeed(target, corners, frame.translation(), triangle, frame.linear() * touch->surface.normal);
         const double left = touch->surface.distance - kTouching * thickness;
-        if (left <= 1e-3 * thickness || i == kMostAdvances) {
-            Contact contact;
-            contact.vertices = corners;
-            contact.weights = touch->weights;
-            contact.normal = normal;
-            contact.point = frame * touch->surface.point;
-            contact.time = t;
-            Vec3 relative = Vec3::Zero();
-            for (int a = 0; a < 3; ++a)
-                relative += touch->weights[a] * relativeVelocity(corners[a], frame.translation(), triangle.col(a));
-            const double depth = -(time - t) * normal.dot(relative);  // at the end of the step
-            if (depth < kShallow * obstacle.body.inner) return std::nullopt;
-            contact.gap = -t * normal.dot(relative) + touch->surface.distance - thickness;
-            return contact;
-        }
+        if (left <= 1e-3 * thickness || i == kMostAdvances) return contactAt(t, *touch, corners);
         if (closing + spin <= 0.0) return std::nullopt;
         t += std::max(left, 1e-2 * thickness) / (closing + spin);
         if (t >= time) return std::nullopt;
     }
 }
 
+/// None if it is so shallow at the end of the step that it will be found there.
+std::optional<Contact> ShellContacts::Sweep::contactAt(double t, const TrianglePoint& touch,
+                                                       const std::array<int, 3>& corners) const {
+    const Frame frame = moved(obstacle.start, twist, t);
+    const Mat3 triangle = triangleAt(corners, t);
+    Contact contact;
+    contact.vertices = corners;
+    contact.weights = touch.weights;
+    contact.normal = frame.linear() * touch.surface.normal;
+    contact.point = frame * touch.surface.point;
+    contact.time = t;
+    Vec3 relative = Vec3::Zero();
+    for (int a = 0; a < 3; ++a)
+        relative += touch.weights[a] * relativeVelocity(corners[a], frame.translation(), triangle.col(a));
+    const double approach = -contact.normal.dot(relative);
+    if ((time - t) * approach < kShallow * obstacle.body.inner) return std::nullopt;
+    contact.gap = t * approach + touch.surface.distance - shell.contactThickness();
+    return contact;
+}
+
+/// All vertices are swept against what stands or is led: a sheet that lies flat on it at the end of the step is held by
+/// each. A free body is stopped by what it hits first, and its other contacts come about later.
+void ShellContacts::sweepPiece(const Sweep& sweep, const SweepTarget& target, std::vector<Contact>& contacts) {
+    const HalfEdgeMesh& mesh = sweep.shell.shell().mesh();
+    const Bounds bounds = sweep.boundsOfBody();
+    const bool isLed = sweep.obstacle.body.prescribed;
+    const auto isSaidByCorner = [&](const Contact& contact, const std::array<int, 3>& corners) {
+        return std::any_of(corners.begin(), corners.end(), [&](int corner) {
+            const auto known = m_byFeature.find(Feature::vertex(corner));
+            return known != m_byFeature.end() && contacts[known->second].time <= contact.time + kSameTime * sweep.time;
+        });
+    };
+    const auto offer = [&](const std::array<int, 3>& corners, int feature) {
+        if (!sweep.boundsOf(corners).overlaps(bounds)) return;
+        auto contact = sweep.advance(target, corners);
+        if (!contact || (isLed && isSaidByCorner(*contact, corners))) return;
+        contact->feature = feature;
+        int corner = 0;
+        if (contact->weights.maxCoeff(&corner) > kAtVertex) {
+            contact->feature = Feature::vertex(corners[corner]);
+            contact->vertices.fill(corners[corner]);
+            contact->weights = Vec3::UnitX();
+        }
+        const auto [known, fresh] = m_byFeature.try_emplace(contact->feature, contacts.size());
+        if (fresh)
+            contacts.push_back(*contact);
+        else if (contact->time < contacts[known->second].time)
+            contacts[known->second] = *contact;
+    };
+    for (int i = 0; isLed && i < mesh.vertexCount(); ++i) offer({i, i, i}, Feature::vertex(i));
+    const int edgeCount = static_cast<int>(mesh.edges().size());
+    for (int t = 0; t < mesh.triangleCount(); ++t) {
+        const auto column = mesh.triangles().col(t);
+        offer({column[0], column[1], column[2]}, Feature::triangle(t, mesh.vertexCount(), edgeCount));
+    }
+}
+
+/// All triangles of a concave piece, read from Bullet's shape once a step.
+const TrianglePatch& ShellContacts::wholeOf(const ConcavePiece& piece, double radius) {
+    const auto known = m_whole.find(&piece);
+    if (known != m_whole.end()) return known->second;
+    const Vec3 centre = piece.frame.inverse(Eigen::Isometry).translation();
+    return m_whole.try_emplace(&piece, *piece.shape, Bounds{centre.array() - radius, centre.array() + radius})
+        .first->second;
+}
+
 void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& contacts) {
-    const auto first = static_cast<std::ptrdiff_t>(contacts.size());
     for (const auto& [shell, body] : m_pairs) {
         if (!motion.fast[body]) continue;
         const Obstacle& obstacle = m_obstacles[body];
-        const HalfEdgeMesh& mesh = m_shells[shell]->shell().mesh();
-        const int edgeCount = static_cast<int>(mesh.edges().size());
+        const Sweep sweep{*m_shells[shell], *motion.start[shell], *motion.end[shell],
+                          obstacle,         motion.twists[body],  motion.time};
+        const auto first = static_cast<std::ptrdiff_t>(contacts.size());
         m_byFeature.clear();
-        for (const auto& piece : obstacle.shape->pieces) {
-            const Sweep sweep{*m_shells[shell], *motion.start[shell], *motion.end[shell], obstacle,
-                              *piece,           motion.twists[body],  motion.time};
-            const Bounds bounds = sweep.boundsOfBody();
-            for (int t = 0; t < mesh.triangleCount(); ++t) {
-                const auto column = mesh.triangles().col(t);
-                const std::array<int, 3> corners{column[0], column[1], column[2]};
-                if (!sweep.boundsOfTriangle(corners).overlaps(bounds)) continue;
-                auto contact = sweep.advance(corners);
-                if (!contact) continue;
-                contact->shell = shell;
-                contact->body = body;
-                contact->feature = Feature::triangle(t, mesh.vertexCount(), edgeCount);
-                int corner = 0;
-                if (contact->weights.maxCoeff(&corner) > kAtVertex) {
-                    contact->feature = Feature::vertex(corners[corner]);
-                    contact->vertices.fill(corners[corner]);
-                    contact->weights = Vec3::UnitX();
-                }
-                const auto [known, fresh] = m_byFeature.try_emplace(contact->feature, contacts.size());
-                if (fresh)
-                    contacts.push_back(*contact);
-                else if (contact->time < contacts[known->second].time)
-                    contacts[known->second] = *contact;
-            }
-        }
+        for (const auto& piece : obstacle.shape->pieces) sweepPiece(sweep, ConvexTarget(*piece), contacts);
+        for (const ConcavePiece& piece : obstacle.shape->concave)
+            sweepPiece(sweep, ConcaveTarget(wholeOf(piece, obstacle.body.radius), piece.frame, obstacle.body.inner),
+                       contacts);
+        std::for_each(contacts.begin() + first, contacts.end(), [&, shell = shell, body = body](Contact& contact) {
+            contact.shell = shell;
+            contact.body = body;
+            setMaterial(contact);
+        });
     }
-    std::for_each(contacts.begin() + first, contacts.end(), [&](Contact& contact) { setMaterial(contact); });
 }
 
 }  // namespace jacket::bullet

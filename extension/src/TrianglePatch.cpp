@@ -274,6 +274,12 @@ void TrianglePatch::touch(const Vec3& p, double reach, double depth, std::vector
     });
 }
 
+std::optional<SurfacePoint> TrianglePatch::touchNearest(const Vec3& p, double reach, double depth) const {
+    const auto found = nearest(p, std::max(reach, depth));
+    if (!found || found->distance > (found->isBehind ? depth : reach)) return std::nullopt;
+    return SurfacePoint{found->point, found->normal, found->isBehind ? -found->distance : found->distance};
+}
+
 bool TrianglePatch::isInside(const Vec3& p, double depth) const {
     const auto found = nearest(p, depth);
     return found && found->isBehind;

@@ -34,6 +34,9 @@ class TrianglePatch {
     /// valley. A point behind a valley's bottom gets every side of it.
     void touch(const Vec3& p, double reach, double depth, std::vector<SurfacePoint>& touched) const;
 
+    /// The nearest surface point alone, if it is at most `reach` in front or `depth` behind.
+    std::optional<SurfacePoint> touchNearest(const Vec3& p, double reach, double depth) const;
+
     /// Appends where a corner of the surface meets the inside of a triangle, and where ridges meet its edges: the
     /// deepest such place of the inside and of each edge, at most `reach` apart or `depth` deep. `edges`: from corner i
     /// to the next. The triangle's own corners are left to touch() of points.

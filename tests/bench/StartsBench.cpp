@@ -5,10 +5,12 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <random>
 #include <string>
 #include <vector>
 
 #include "support/HardScenes.h"
+#include "support/Target.h"
 
 namespace jacket::bullet::testing {
 namespace {
@@ -78,6 +80,40 @@ void lightBall(double ratio, int starts) {
                 int(thrown), starts, gains.back());
 }
 
+/// Bodies 10 cm thick (rods: 4 cm) that fly against a sheet in steps of 1/60 s: 0.03 to 1 kg, from 11 to 91 cm away.
+void missiles(const std::string& shape, double speed, int starts) {
+    const btVector3 half(btScalar(0.05), btScalar(0.05), btScalar(0.05));
+    const auto surface = boxMesh(half);
+    const auto solid = [&]() -> std::unique_ptr<btCollisionShape> {
+        if (shape == "ball") return std::make_unique<btSphereShape>(half.x());
+        if (shape == "box") return std::make_unique<btBoxShape>(half);
+        if (shape == "rod") return std::make_unique<btCapsuleShapeX>(btScalar(0.02), btScalar(0.3));
+        return gimpactShape(*surface);
+    };
+    int stopped = 0, silent = 0;
+    double most = 0.0;
+    std::mt19937 chance(7);
+    const auto between = [&](double low, double high) { return low + (high - low) * (chance() / 4294967296.0); };
+    for (int i = 0; i < starts; ++i) {
+        Target scene;
+        const double x = between(-0.1, 0.1), z = between(-0.1, 0.1), y = between(0.11, 0.91);
+        auto& body = scene.addBody(solid(), std::pow(10.0, between(-1.5, 0.0)),
+                                   btVector3(btScalar(x), btScalar(y), btScalar(z)));
+        body.setLinearVelocity(btVector3(0, btScalar(-speed), 0));
+        const double start = jacket::testing::energy(scene).total();
+        for (int k = 0; k < 25 + int(60.0 * y / speed); ++k) {
+            scene.step(kStep);
+            most = std::max(most, jacket::testing::energy(scene).total() / start);
+        }
+        const bool isAbove = scene.isAbove(body);
+        stopped += isAbove;
+        silent += !isAbove && scene.shells->lastStep().passedSteps == 0;
+    }
+    std::printf(
+        "%-4s against a sheet, %4.3g m/s   %3d of %d stopped, %d silently through; most energy %.3g of the start's\n",
+        shape.c_str(), speed, stopped, starts, silent, most);
+}
+
 /// After 10 s that it has to come to rest.
 void ballAtRest(int cells, int steps) {
     RestingBall resting(cells);
@@ -101,6 +137,8 @@ void runAll(int starts) {
     for (const int count : {2, 3})
         for (const double h : {1.0 / 60, 1.0 / 240}) stack(count, h, starts);
     for (const double ratio : {1e-3, 1e-2, 1.0}) lightBall(ratio, starts);
+    for (const char* shape : {"ball", "rod", "box", "mesh"})
+        for (const double speed : {1.5, 3.0, 5.0, 15.0, 60.0}) missiles(shape, speed, starts);
     for (const int cells : {11, 12, 16, 24}) ballAtRest(cells, 500 * starts);
 }
 

@@ -112,8 +112,7 @@ TEST(BundledScenes, RunToTheirEnds) {
     const TemporaryFolder folder;
     for (const fs::path& scene : bundledScenes()) {
         const Outcome run = jacket({"run", scene.stem().string(), "--quiet", "--out", folder / "out"});
-        EXPECT_TRUE(run.exitCode == 0 || run.exitCode == 3)
-            << scene << " ended with " << run.exitCode << ": " << run.err;
+        EXPECT_EQ(run.exitCode, 0) << scene << ": " << run.err;
         const Json result = parseJson(readText(folder / "out" / "result.json"), "result.json");
         EXPECT_LT(result.at("peak_stretch").get<double>(), 0.5) << scene;
     }

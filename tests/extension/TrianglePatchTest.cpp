@@ -88,6 +88,9 @@ TEST(TrianglePatch, PointsAreAtTheNearestOfAllTriangles) {
             const bool isInside = winding(soup.triangles, p) > 0.5;
             std::vector<SurfacePoint> touched;
             patch.touch(p, 4 * scale, 4 * scale, touched);
+            const auto alone = patch.touchNearest(p, 4 * scale, 4 * scale);
+            ASSERT_TRUE(alone);
+            EXPECT_NEAR(alone->distance, isInside ? -least : least, kAccuracy * scale);
             ++poses;
             ASSERT_FALSE(touched.empty());
             for (const SurfacePoint& s : touched) {

@@ -77,19 +77,30 @@ bool ContactResponse::closeFound(const IslandVelocities& solved, int round) {
     return changed;
 }
 
-/// Holds what the solved motion passes first.
+/// Holds what the solved motion passes first; of bodies that nothing stops, all that it passes with a
+/// vertex that was not held before.
 bool ContactResponse::closeFirst(int round) {
     sweepToEnd();
     if (m_found.empty()) return false;
     const auto first = std::min_element(m_found.begin(), m_found.end(),
                                         [](const Contact& a, const Contact& b) { return a.time < b.time; });
-    const auto [known, fresh] = m_index.try_emplace(keyOf(*first), static_cast<int>(m_touches.size()));
-    if (fresh) add(makeTouch(*first));
+    bool changed = false;
+    for (const Contact& contact : m_found) {
+        const bool isNew = contact.isVertex() && m_index.find(keyOf(contact)) == m_index.end();
+        if (&contact == &*first || (isNew && m_input.bodies[contact.body].prescribed))
+            changed |= closePassed(contact, round);
+    }
+    return changed;
+}
+
+bool ContactResponse::closePassed(const Contact& contact, int round) {
+    const auto [known, fresh] = m_index.try_emplace(keyOf(contact), static_cast<int>(m_touches.size()));
+    if (fresh) add(makeTouch(contact));
     Touch& touch = m_touches[known->second];
     if (touch.active && round >= kFreezeRound) return false;
-    place(touch, *first);
+    place(touch, contact);
     touch.active = true;
-    touch.target = -first->gap / m_input.h;  // as close as they were when they touched
+    touch.target = -contact.gap / m_input.h;  // as close as they were when they touched
     if (touch.bounces) touch.target = std::max(touch.target, leavingSpeed(touch));
     return true;
 }

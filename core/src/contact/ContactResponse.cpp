@@ -231,14 +231,16 @@ void ContactResponse::findRoomBesideFaces() {
     }
 }
 
-/// Bodies that move farther relative to some vertex than they are thick.
+/// Bodies that move farther relative to some vertex than they are thick, or free ones half as far: from inside them the
+/// nearest surface may already be another than the one that hit it, and they would be pushed on through the shell.
 void ContactResponse::findFast() {
     m_fast.assign(m_input.bodies.size(), 0);
     m_anyFast = false;
     for (std::size_t b = 0; b < m_input.bodies.size(); ++b) {
         const CoupledBody& body = m_input.bodies[b];
-        const double least =
-            std::pow((body.inner - body.freeTwist.tail<3>().norm() * m_input.h * body.radius) / m_input.h, 2);
+        const double spun = body.freeTwist.tail<3>().norm() * m_input.h * body.radius;
+        const double far = std::max(0.0, (body.prescribed ? 1.0 : 0.5) * body.inner - spun);
+        const double least = std::pow(far / m_input.h, 2);
         for (int i = 0; i < m_expected->cols() && !m_fast[b]; ++i)
             m_fast[b] = (m_expected->col(i) - body.freeTwist.head<3>()).squaredNorm() > least;
         m_anyFast = m_anyFast || m_fast[b];

@@ -167,6 +167,7 @@ class ContactResponse {
     void moveToEnd(const IslandVelocities& solved, const Points& y);
     void sweepToEnd();
     bool closeFirst(int round);
+    bool closePassed(const Contact& contact, int round);
     void findRoomBesideFaces();
     void addAtStart(const Contact& contact, Points& y);
     bool isRather(const Touch& touch, const Touch& other, const Memory* memory) const;

@@ -1,0 +1,54 @@
+#pragma once
+#include <BulletCollision/CollisionShapes/btTriangleMesh.h>
+#include <BulletCollision/Gimpact/btGImpactShape.h>
+
+#include <array>
+#include <memory>
+
+#include "support/BulletScene.h"
+
+namespace jacket::bullet::testing {
+
+/// The surface of a box of given half extents.
+inline std::unique_ptr<btTriangleMesh> boxMesh(const btVector3& half) {
+    auto mesh = std::make_unique<btTriangleMesh>();
+    for (int axis = 0; axis < 3; ++axis)
+        for (const int side : {-1, 1}) {
+            std::array<btVector3, 4> corners;  // counter-clockwise from outside
+            for (int k = 0; k < 4; ++k) {
+                corners[k][axis] = side * half[axis];
+                corners[k][(axis + 1) % 3] = (k == 1 || k == 2 ? side : -side) * half[(axis + 1) % 3];
+                corners[k][(axis + 2) % 3] = (k < 2 ? -1 : 1) * half[(axis + 2) % 3];
+            }
+            mesh->addTriangle(corners[0], corners[1], corners[2]);
+            mesh->addTriangle(corners[0], corners[2], corners[3]);
+        }
+    return mesh;
+}
+
+inline std::unique_ptr<btCollisionShape> gimpactShape(btTriangleMesh& mesh) {
+    auto shape = std::make_unique<btGImpactMeshShape>(&mesh);
+    shape->updateBound();
+    return shape;
+}
+
+/// A sheet of 1 m, held at its border in the plane y = 0, without gravity.
+struct Target : BulletScene {
+    ShellBody& sheet;
+    Target() : BulletScene(0.0), sheet(shells->add(squareSheet(1, 20), trampolineCloth())) { pinBorder(sheet); }
+
+    /// Whether the middle of a body near the sheet's middle is above it: by the heights of the vertices around.
+    bool isAbove(const btRigidBody& body) const {
+        const Vec3 centre = toVec3(body.getWorldTransform().getOrigin());
+        const Points& x = sheet.shell().positions();
+        Eigen::Index nearest = 0;
+        (Eigen::Matrix2Xd(2, x.cols()) << x.row(0).array() - centre.x(), x.row(2).array() - centre.z())
+            .finished()
+            .colwise()
+            .squaredNorm()
+            .minCoeff(&nearest);
+        return centre.y() > x(1, nearest) - 0.05;
+    }
+};
+
+}  // namespace jacket::bullet::testing
