@@ -238,7 +238,8 @@ void ContactResponse::findFast() {
     m_anyFast = false;
     for (std::size_t b = 0; b < m_input.bodies.size(); ++b) {
         const CoupledBody& body = m_input.bodies[b];
-        const double spun = body.freeTwist.tail<3>().norm() * m_input.h * body.radius;
+        const double spin = body.freeTwist.tail<3>().norm();
+        const double spun = spin > 0.0 ? spin * m_input.h * body.radius : 0.0;  // a plane's radius is infinite
         const double far = std::max(0.0, (body.prescribed ? 1.0 : 0.5) * body.inner - spun);
         const double least = std::pow(far / m_input.h, 2);
         for (int i = 0; i < m_expected->cols() && !m_fast[b]; ++i)
