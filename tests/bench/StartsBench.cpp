@@ -5,11 +5,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "support/HardScenes.h"
+#include "support/RandomWorld.h"
 #include "support/Target.h"
 
 namespace jacket::bullet::testing {
@@ -82,22 +82,14 @@ void lightBall(double ratio, int starts) {
 
 /// Bodies 10 cm thick (rods: 4 cm) that fly against a sheet in steps of 1/60 s: 0.03 to 1 kg, from 11 to 91 cm away.
 void missiles(const std::string& shape, double speed, int starts) {
-    const btVector3 half(btScalar(0.05), btScalar(0.05), btScalar(0.05));
-    const auto surface = boxMesh(half);
-    const auto solid = [&]() -> std::unique_ptr<btCollisionShape> {
-        if (shape == "ball") return std::make_unique<btSphereShape>(half.x());
-        if (shape == "box") return std::make_unique<btBoxShape>(half);
-        if (shape == "rod") return std::make_unique<btCapsuleShapeX>(btScalar(0.02), btScalar(0.3));
-        return gimpactShape(*surface);
-    };
+    const auto cube = boxMesh(kHalf);
     int stopped = 0, silent = 0;
     double most = 0.0;
-    std::mt19937 chance(7);
-    const auto between = [&](double low, double high) { return low + (high - low) * (chance() / 4294967296.0); };
+    Draw draw(7);
     for (int i = 0; i < starts; ++i) {
         Target scene;
-        const double x = between(-0.1, 0.1), z = between(-0.1, 0.1), y = between(0.11, 0.91);
-        auto& body = scene.addBody(solid(), std::pow(10.0, between(-1.5, 0.0)),
+        const double x = draw.between(-0.1, 0.1), z = draw.between(-0.1, 0.1), y = draw.between(0.11, 0.91);
+        auto& body = scene.addBody(missile(shape, *cube), std::pow(10.0, draw.between(-1.5, 0.0)),
                                    btVector3(btScalar(x), btScalar(y), btScalar(z)));
         body.setLinearVelocity(btVector3(0, btScalar(-speed), 0));
         const double start = jacket::testing::energy(scene).total();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "support/HardScenes.h"
 #include "support/Target.h"
 
 namespace jacket::bullet::testing {
@@ -41,11 +42,9 @@ class Missile : public ::testing::TestWithParam<std::tuple<const char*, bool, do
 TEST_P(Missile, NeverPassesSilently) {
     const auto [shape, launched, height] = GetParam();
     Target scene;
-    const auto cube = boxMesh(btVector3(btScalar(0.05), btScalar(0.05), btScalar(0.05)));
-    std::unique_ptr<btCollisionShape> solid = std::make_unique<btSphereShape>(btScalar(0.05));
-    if (std::string(shape) == "rod") solid = std::make_unique<btCapsuleShapeX>(btScalar(0.02), btScalar(0.3));
-    if (std::string(shape) == "mesh") solid = gimpactShape(*cube);
-    auto& body = scene.addBody(std::move(solid), 0.5, btVector3(btScalar(0.013), btScalar(height), btScalar(0.021)));
+    const auto cube = boxMesh(kHalf);
+    auto& body =
+        scene.addBody(missile(shape, *cube), 0.5, btVector3(btScalar(0.013), btScalar(height), btScalar(0.021)));
     if (launched) scene.run(0.05, 1.0 / 60);
     body.activate(true);
     body.setLinearVelocity(btVector3(0, -40, 0));
@@ -70,15 +69,12 @@ class SlowMissile : public ::testing::TestWithParam<std::tuple<const char*, doub
 
 TEST_P(SlowMissile, IsStopped) {
     const auto [shape, speed] = GetParam();
-    const btVector3 half(btScalar(0.05), btScalar(0.05), btScalar(0.05));
-    const auto cube = boxMesh(half);
+    const auto cube = boxMesh(kHalf);
     int stopped = 0;
     for (const double height : {0.13, 0.15, 0.17, 0.19, 0.21, 0.23}) {
         Target scene;
-        std::unique_ptr<btCollisionShape> solid = std::make_unique<btBoxShape>(half);
-        if (std::string(shape) == "mesh") solid = gimpactShape(*cube);
         auto& body =
-            scene.addBody(std::move(solid), 0.5, btVector3(btScalar(0.013), btScalar(height), btScalar(0.021)));
+            scene.addBody(missile(shape, *cube), 0.5, btVector3(btScalar(0.013), btScalar(height), btScalar(0.021)));
         body.setLinearVelocity(btVector3(0, btScalar(-speed), 0));
         const double start = energy(scene).total();
         for (int i = 0; i < 25; ++i) {
@@ -107,9 +103,7 @@ TEST_P(Board, IsNotPassedByASheet) {
         if (std::string(shape) == "mesh") solid = std::make_unique<btBvhTriangleMeshShape>(surface.get(), true);
         scene.addBody(std::move(solid), 0, btVector3(0, 0, 0));
         auto& sheet = scene.shells->add(squareSheet(1, 12), trampolineCloth());
-        std::vector<btVector3> x(sheet.positions().begin(), sheet.positions().end());
-        for (btVector3& p : x) p += btVector3(btScalar(0.01), btScalar(height), btScalar(0.02));
-        sheet.setPositions(x);
+        place(sheet, {0.01, height, 0.02});
         sheet.setVelocity(btVector3(0, btScalar(-speed), 0));
         const double start = energy(scene).total();
         for (int i = 0; i < 70 && i < 1 + 60 * 2 * height / speed + 10; ++i) {

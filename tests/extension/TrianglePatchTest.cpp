@@ -167,8 +167,8 @@ TEST(TrianglePatch, EdgesAcrossARidgeAreAsDeepAsTheyCutIt) {
     }
 }
 
-/// A level triangle whose first edge passes inside a post, beside its upright ridge and deeper below its upper ones
-/// than from that. What the sheet goes on beyond is pushed up, not along itself; where it ends it may be pushed aside.
+/// A level triangle whose first edge cuts off the upright ridge of a post, far below its top. Where the sheet goes on
+/// beyond the edge it is pushed up, not along itself; where it ends it may be pushed aside.
 TEST(TrianglePatch, SharedEdgesAreNotPushedAlongTheirSheet) {
     Soup soup;  // the post's upper corner is at the origin, it stands in x < 0, z < 0
     const Vec3 corner(0, 0, 0), foot(0, -9, 0), left(-9, 0, 0), back(0, 0, -9);

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <memory>
+#include <string>
 
 #include "support/BulletScene.h"
 
@@ -30,6 +31,17 @@ inline std::unique_ptr<btCollisionShape> gimpactShape(btTriangleMesh& mesh) {
     auto shape = std::make_unique<btGImpactMeshShape>(&mesh);
     shape->updateBound();
     return shape;
+}
+
+/// Half the side of the cubes that fly, and the radius of the balls [m].
+inline const btVector3 kHalf{btScalar(0.05), btScalar(0.05), btScalar(0.05)};
+
+/// "ball", "box" or "mesh" of 10 cm, or a "rod" 4 cm thick. `cube`: what the mesh is made of, boxMesh(kHalf).
+inline std::unique_ptr<btCollisionShape> missile(const std::string& shape, btTriangleMesh& cube) {
+    if (shape == "ball") return std::make_unique<btSphereShape>(kHalf.x());
+    if (shape == "box") return std::make_unique<btBoxShape>(kHalf);
+    if (shape == "rod") return std::make_unique<btCapsuleShapeX>(btScalar(0.02), btScalar(0.3));
+    return gimpactShape(cube);
 }
 
 /// A sheet of 1 m, held at its border in the plane y = 0, without gravity.
