@@ -13,6 +13,7 @@
 
 #include "EdgeStretch.h"
 #include "ShellAssembly.h"
+#include "StepParts.h"
 #include "contact/ContactResponse.h"
 #include "solver/BodySupports.h"
 #include "solver/FilteredPcg.h"
@@ -109,6 +110,7 @@ struct IslandSolver::Impl {
     bool isTwoStep = false;          ///< whether some shell takes a step of BDF2
     std::vector<double> stepOf;      ///< of each shell, as its integrator counts it [s]
     std::vector<char> factored;      ///< shells: completely
+    bool mayBeShorter = false;       ///< the step that is being solved
     bool givesWay = true;            ///< false, as long as anything touches: see pushesStrain
     Points lastChange;               ///< dv of the last step
     Points expected;                 ///< velocities if that goes on
@@ -128,6 +130,7 @@ struct IslandSolver::Impl {
     mutable std::vector<double> elasticAtStart;  ///< of each shell at the start of the step; NaN: not yet asked for [J]
     StepTimes times;                             ///< of the step so far
     StepReport lastReport;
+    double partOfStep = 1.0;        ///< that is being solved: what a step may gain, its parts may together
     double impulseShare = 1.0;      ///< of the solved contacts that a step cut short takes: see limitDeformation
     std::vector<double> bodyShare;  ///< of that, what each dynamic body takes: see limitBodies
 
@@ -164,8 +167,12 @@ struct IslandSolver::Impl {
     PcgReport solveOnce(const IslandInput& input, bool roughly, int maxIterations, StepReport& report);
     void solveRound(const IslandInput& input, bool roughly, int& freshIterations, StepReport& report);
     void solveRounds(const IslandInput& input, StepReport& report);
-    bool store(const IslandInput& input, StepReport& report);
+    void store(const IslandInput& input);
+    void attempt(const IslandInput& input);
+    bool isWorthParts() const;
+    void solveInParts(const IslandInput& input);
     bool isFinite(const IslandInput& input) const;
+    void reject();
     bool pushesStrain(const IslandInput& input);
     void pushOut(const IslandInput& input, StepReport& report);
     void balance(const IslandInput& input, std::vector<ContactImpulse>& impulses);
@@ -183,35 +190,64 @@ const StepReport& IslandSolver::solve(const IslandInput& input) {
     if (!(input.h > 0.0) || !std::isfinite(input.h))
         throw std::invalid_argument("IslandInput.h [s] must be > 0 and finite");
     Impl& s = *m_impl;
-    StepReport& report = s.lastReport;
-    s.clearReport();
-    s.impulseShare = 1.0;
-    s.unsettled = false;
-    s.times = {};
-    s.gather(input);
+    s.mayBeShorter = StepParts::areAllowed(input);
+    s.attempt(input);
+    if (s.isWorthParts())
+        s.solveInParts(input);
+    else
+        s.store(input);
+    return s.lastReport;
+}
+
+/// Everything but what others would see of it.
+void IslandSolver::Impl::attempt(const IslandInput& input) {
+    StepReport& report = lastReport;
+    clearReport();
+    impulseShare = 1.0;
+    unsettled = false;
+    times = {};
+    gather(input);
     LapTimer lap(input);
-    s.beginContacts(input);
-    lap.addTo(s.times.contact);
-    s.solveStep(input, report);  // A, b; filtered PCG until the contacts agree
-    if (!report.limited && s.pushesStrain(input)) {
-        s.givesWay = false;
-        s.gather(input);
-        s.beginContacts(input);
-        s.solveStep(input, report);
+    beginContacts(input);
+    lap.addTo(times.contact);
+    solveStep(input, report);  // A, b; filtered PCG until the contacts agree
+    if (!report.limited && pushesStrain(input)) {
+        givesWay = false;
+        gather(input);
+        beginContacts(input);
+        solveStep(input, report);
     }
-    report.times = s.times;
-    if (!s.u.allFinite() || !s.unfiltered().allFinite()) {  // state untouched; the caller decides
-        report.finite = report.converged = false;
-        return report;
-    }
-    if (!s.dynamicBodies.empty()) s.limitBodies(input, report);
+    report.times = times;
+    report.finite = u.allFinite() && unfiltered().allFinite();
+    if (!report.finite) return;
+    if (!dynamicBodies.empty()) limitBodies(input, report);
     LapTimer closing(input);
-    report.passed = s.response.passes({s.v, s.endTwists(), s.unfiltered()}, s.y);
+    report.passed = response.passes({v, endTwists(), unfiltered()}, y);
     closing.addTo(report.times.contact);
-    report.settled = !s.unsettled;
-    report.mayPass = s.response.hasFastBody() && (report.limited || s.unsettled);
-    if (!s.store(input, report)) report.finite = report.converged = false;  // velocities, twists, reactions
-    return report;
+    report.settled = !unsettled;
+    report.mayPass = response.hasFastBody() && (report.limited || unsettled);
+}
+
+/// Whether contacts with a fast body did not settle in the whole of a step.
+bool IslandSolver::Impl::isWorthParts() const {
+    return (lastReport.passed || lastReport.mayPass) && mayBeShorter;
+}
+
+void IslandSolver::Impl::solveInParts(const IslandInput& input) {
+    StepParts step(input, lastReport);
+    while (!step.areDone()) {
+        partOfStep = step.next().h / input.h;
+        mayBeShorter = step.mayBeShorter();
+        attempt(step.next());
+        if (isWorthParts()) {
+            step.shorten(lastReport);
+            continue;
+        }
+        store(step.next());
+        step.add(lastReport);
+    }
+    partOfStep = 1.0;
+    lastReport = step.report();
 }
 
 void IslandSolver::Impl::clearReport() {
@@ -260,7 +296,7 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
 
 /// Those at the start of the step, and y.
 void IslandSolver::Impl::beginContacts(const IslandInput& input) {
-    response.begin(input, {offsets, dynamicIndex, stepOf, isAnyFactored(), givesWay}, expected, y);
+    response.begin(input, {offsets, dynamicIndex, stepOf, isAnyFactored(), givesWay, mayBeShorter}, expected, y);
     givesWay = givesWay || !response.hasContacts();
 }
 
@@ -315,7 +351,7 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
         solveRounds(input, report);
     }
     const double mostGain = response.hasFastBody() && bodiesLead(input) ? kMostGainOfFast : kMostEnergyGain;
-    if (unfiltered().allFinite() && energyGain(input) > mostGain) limitDeformation(input, report);
+    if (unfiltered().allFinite() && energyGain(input) > partOfStep * mostGain) limitDeformation(input, report);
 }
 
 /// After one more Newton step: goes back along it until the incremental potential is not above what it was, and says
@@ -420,7 +456,7 @@ void IslandSolver::Impl::limitPushes(const IslandInput& input) {
     makeRigid(input, rigid, input.h);
     double most = 0.0;
     for (std::size_t k = 0; k < input.shells.size(); ++k)
-        most += elasticAtStart[k] + kMostEnergyGain * (elasticAtStart[k] + energyOfMotion(input, k));
+        most += elasticAtStart[k] + partOfStep * kMostEnergyGain * (elasticAtStart[k] + energyOfMotion(input, k));
     const auto energyAfter = [&] {
         double sum = 0.0;
         for (std::size_t k = 0; k < input.shells.size(); ++k) sum += elasticEnergyAfter(input, k, rigid);
@@ -748,8 +784,10 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
     unsettled |= !response.isQuick() && response.isLast(round);
 }
 
-/// What was solved goes to the bodies and then to the shells, unless it is not finite: false.
-bool IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
+/// What was solved goes to the bodies and then to the shells, unless it is not finite.
+void IslandSolver::Impl::store(const IslandInput& input) {
+    StepReport& report = lastReport;
+    if (!report.finite) return reject();
     response.finish(report.contacts);
     if (impulseShare == 0.0) report.contacts.clear();
     const BodyVectors& twists = endTwists();
@@ -762,15 +800,13 @@ bool IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
     for (std::size_t b = 0; b < input.bodies.size(); ++b) {
         CoupledBody& body = input.bodies[b];
         body.twist = body.prescribed ? body.freeTwist : Vec6(twists.col(dynamicIndex[b]));
+        body.motion = input.h * body.twist;
         // The solved change of momentum, not the sum of the contacts' impulses: a light body would feel their residual.
         body.impulse = body.prescribed ? Vec6::Zero() : Vec6(momentum.col(dynamicIndex[b]));
     }
     balance(input, report.contacts);
     if (!report.limited) pushOut(input, report);
-    if (!isFinite(input)) {
-        report.contacts.clear();
-        return false;
-    }
+    if (!isFinite(input)) return reject();
     report.deepestGap = response.deepestGap();
     if (report.deepestGap < -20.0 * response.slop()) report.converged = false;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
@@ -785,7 +821,12 @@ bool IslandSolver::Impl::store(const IslandInput& input, StepReport& report) {
         shell.m_v = v.middleCols(offsets[k], n);
         shell.m_y = y.middleCols(offsets[k], n);
     }
-    return true;
+}
+
+/// The state is as it was; the caller decides.
+void IslandSolver::Impl::reject() {
+    lastReport.finite = lastReport.converged = false;
+    lastReport.contacts.clear();
 }
 
 bool IslandSolver::Impl::isFinite(const IslandInput& input) const {
@@ -796,7 +837,7 @@ bool IslandSolver::Impl::isFinite(const IslandInput& input) const {
 /// Whether pushOut would strain the shells, which then do not give way to it: sheet metal that stands on its edge, a
 /// bowl on its rim.
 bool IslandSolver::Impl::pushesStrain(const IslandInput& input) {
-    constexpr double kMost = kMostEnergyGain;
+    const double most = partOfStep * kMostEnergyGain;
     if (!response.isQuick() || !unfiltered().allFinite()) return false;
     const auto& pushes = response.pushes(v);
     const auto energyAfter = [&] {
@@ -814,13 +855,13 @@ bool IslandSolver::Impl::pushesStrain(const IslandInput& input) {
         for (auto one = pushes.lower_bound(offsets[k]); one != end; ++one)
             stretching += strainOfPush(shell, one->second.norm());
     }
-    if (stretching <= kMost * moving) return false;
+    if (stretching <= most * moving) return false;
     reached = v;
     const double before = energyAfter();
     for (const auto& [vertex, by] : pushes) v.col(vertex) += by / input.h;
     const double after = energyAfter();
     v.swap(reached);
-    return after - before > kMost * (moving + before);
+    return after - before > most * (moving + before);
 }
 
 /// The contacts' last word where they were settled in few rounds.

@@ -21,17 +21,17 @@ Eigen::Matrix<double, 3, 6> motionOf(const Vec3& arm) {
 
 }  // namespace
 
-void CarriedVertices::addTouching(ShellBody& shell, int vertex, const Obstacle& obstacle, const Vec6& twist,
+void CarriedVertices::addTouching(ShellBody& shell, int vertex, const Obstacle& obstacle, const Frame& end,
                                   const Vec3& normal) {
     shell.m_ahead.resize(3, shell.m_shell.vertexCount());  // now, or a later step would ask for it
-    m_vertices.push_back({&shell, vertex, obstacle.object, obstacle.object->getBroadphaseHandle()->getUid(),
-                          obstacle.start, twist, std::nullopt, normal});
+    m_vertices.push_back(
+        {&shell, vertex, obstacle.object, obstacle.object->getBroadphaseHandle()->getUid(), end, std::nullopt, normal});
 }
 
-void CarriedVertices::addTied(ShellBody& shell, int vertex, const Obstacle& obstacle, const Vec6& twist,
+void CarriedVertices::addTied(ShellBody& shell, int vertex, const Obstacle& obstacle, const Frame& end,
                               const Vec3& point) {
-    m_vertices.push_back({&shell, vertex, obstacle.object, obstacle.object->getBroadphaseHandle()->getUid(),
-                          obstacle.start, twist, obstacle.start.inverse(Eigen::Isometry) * point, Vec3::Zero()});
+    m_vertices.push_back({&shell, vertex, obstacle.object, obstacle.object->getBroadphaseHandle()->getUid(), end,
+                          obstacle.start.inverse(Eigen::Isometry) * point, Vec3::Zero()});
 }
 
 void CarriedVertices::move(const btCollisionWorld& world, const Vec3& gravity, double h) {
@@ -56,7 +56,7 @@ void CarriedVertices::findShifts(const ShellBody& shell, const btCollisionWorld&
     for (const Carried& c : m_vertices) {
         if (c.shell != &shell || idOf(world, c.object) != c.objectId) continue;
         const Vec3 assumed = shell.shell().positions().col(c.vertex);
-        const Vec3 local = c.anchor ? *c.anchor : moved(c.start, c.twist, h).inverse(Eigen::Isometry) * assumed;
+        const Vec3 local = c.anchor ? *c.anchor : c.end.inverse(Eigen::Isometry) * assumed;
         const Vec3 by = fromBullet(c.object->getWorldTransform()) * local - assumed;
         if (by.norm() < kTeleport * h && by.allFinite()) m_shifts.push_back({&c, by});
     }

@@ -12,9 +12,9 @@ namespace jacket::bullet {
 class CarriedVertices {
   public:
     /// A vertex that touches the body. `twist`: of the solve; `normal`: out of the body.
-    void addTouching(ShellBody& shell, int vertex, const Obstacle& obstacle, const Vec6& twist, const Vec3& normal);
+    void addTouching(ShellBody& shell, int vertex, const Obstacle& obstacle, const Frame& end, const Vec3& normal);
     /// A vertex that is tied to the body at `point`, in the world, at the start of the step.
-    void addTied(ShellBody& shell, int vertex, const Obstacle& obstacle, const Vec6& twist, const Vec3& point);
+    void addTied(ShellBody& shell, int vertex, const Obstacle& obstacle, const Frame& end, const Vec3& point);
     /// After the shells have moved by what was solved for. Forgets them all.
     void move(const btCollisionWorld& world, const Vec3& gravity, double h);
     void clear() { m_vertices.clear(); }
@@ -25,8 +25,7 @@ class CarriedVertices {
         int vertex;
         const btCollisionObject* object;
         int objectId;
-        Frame start;
-        Vec6 twist;
+        Frame end;                   ///< where the body was solved to go
         std::optional<Vec3> anchor;  ///< in the body's frame; none: it touches the body
         Vec3 normal;                 ///< of what touches
     };

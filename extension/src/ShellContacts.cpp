@@ -78,12 +78,15 @@ ShellContacts::ShellContacts(std::span<const ShellBody* const> shells, std::span
     : m_shells(shells),
       m_obstacles(obstacles),
       m_pairs(pairs),
+      m_start(&memory.pool),
       m_memory(memory),
       m_materials(&memory.pool),
       m_byFeature(&memory.pool),
       m_sides(pairs.size(), &memory.pool),
       m_patches(&memory.pool),
       m_depth(pairs.size(), 0.0, &memory.pool) {
+    m_start.reserve(m_obstacles.size());
+    for (const Obstacle& obstacle : m_obstacles) m_start.push_back(obstacle.start);
     m_patches.reserve(m_pairs.size());
     for (const auto& [shell, body] : m_pairs) m_patches.emplace_back(m_obstacles[body].shape->concave.size());
 }
@@ -101,7 +104,7 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
                     body,
                     *m_shells[shell],
                     *pose.positions[shell],
-                    moved(obstacle.start, pose.twists[body], pose.time),
+                    moved(m_start[body], pose.twists[body], pose.time),
                     std::min(vertexReach, obstacle.body.inner),  // beyond that its nearest point says nothing
                     faceReach,
                     contacts};
@@ -114,6 +117,10 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
         addVertices(query);
         std::for_each(contacts.begin() + first, contacts.end(), [&](Contact& contact) { setMaterial(contact); });
     }
+}
+
+void ShellContacts::advance(std::span<const Vec6> twists, double time) {
+    for (std::size_t b = 0; b < m_start.size(); ++b) m_start[b] = moved(m_start[b], twists[b], time);
 }
 
 void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {

@@ -27,6 +27,7 @@ class ShellContacts final : public ContactDetector {
                   std::span<const std::pair<int, int>> pairs, Memory& memory);
     void find(const ContactPose& pose, double vertexReach, double faceReach, std::vector<Contact>& contacts) override;
     void sweep(const ContactSweep& motion, std::vector<Contact>& contacts) override;
+    void advance(std::span<const Vec6> twists, double time) override;
 
   private:
     struct Query;
@@ -47,6 +48,7 @@ class ShellContacts final : public ContactDetector {
     std::span<const ShellBody* const> m_shells;
     std::span<const Obstacle> m_obstacles;
     std::span<const std::pair<int, int>> m_pairs;
+    std::pmr::vector<Frame> m_start;  ///< of the obstacles: pose that motions are counted from
     Memory& m_memory;
     /// What the user made of a contact when it was first found in this step.
     struct Material {

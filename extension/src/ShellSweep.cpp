@@ -86,13 +86,14 @@ struct ShellContacts::Sweep {
     const ShellBody& shell;
     const Points &start, &end;
     const Obstacle& obstacle;
+    const Frame& bodyStart;
     Vec6 twist;
     double time;
 
     Bounds boundsOfBody() const {
         const Vec3 radius = Vec3::Constant(obstacle.body.radius + shell.contactThickness());
-        const Vec3 first = moved(obstacle.start, twist, 0.0).translation(),
-                   last = moved(obstacle.start, twist, time).translation();
+        const Vec3 first = moved(bodyStart, twist, 0.0).translation(),
+                   last = moved(bodyStart, twist, time).translation();
         return {first.cwiseMin(last) - radius, first.cwiseMax(last) + radius};
     }
     Bounds boundsOf(const std::array<int, 3>& corners) const {
@@ -136,7 +137,7 @@ std::optional<Contact> ShellContacts::Sweep::advance(const SweepTarget& target,
     const bool isPoint = corners[0] == corners[1];
     double t = 0.0;
     for (int i = 0;; ++i) {
-        const Frame frame = moved(obstacle.start, twist, t);
+        const Frame frame = moved(bodyStart, twist, t);
         const Mat3 triangle = triangleAt(corners, t);
         const auto touch = target.touch(transformed(frame.inverse(Eigen::Isometry), triangle), isPoint);
         if (!touch) return std::nullopt;
@@ -154,7 +155,7 @@ std::optional<Contact> ShellContacts::Sweep::advance(const SweepTarget& target,
 /// None if it is so shallow at the end of the step that it will be found there.
 std::optional<Contact> ShellContacts::Sweep::contactAt(double t, const TrianglePoint& touch,
                                                        const std::array<int, 3>& corners) const {
-    const Frame frame = moved(obstacle.start, twist, t);
+    const Frame frame = moved(bodyStart, twist, t);
     const Mat3 triangle = triangleAt(corners, t);
     Contact contact;
     contact.vertices = corners;
@@ -221,8 +222,8 @@ void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& cont
     for (const auto& [shell, body] : m_pairs) {
         if (!motion.fast[body]) continue;
         const Obstacle& obstacle = m_obstacles[body];
-        const Sweep sweep{*m_shells[shell], *motion.start[shell], *motion.end[shell],
-                          obstacle,         motion.twists[body],  motion.time};
+        const Sweep sweep{*m_shells[shell], *motion.start[shell], *motion.end[shell], obstacle,
+                          m_start[body],    motion.twists[body],  motion.time};
         const auto first = static_cast<std::ptrdiff_t>(contacts.size());
         m_byFeature.clear();
         for (const auto& piece : obstacle.shape->pieces) sweepPiece(sweep, ConvexTarget(*piece), contacts);

@@ -5,6 +5,7 @@
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 #include <LinearMath/btIDebugDraw.h>
+#include <LinearMath/btTransformUtil.h>
 
 #include <algorithm>
 #include <chrono>
@@ -50,6 +51,7 @@ class TimedDetector : public ContactDetector {
         m_detector.sweep(motion, contacts);
         m_sum += seconds() - start;
     }
+    void advance(std::span<const Vec6> twists, double time) override { m_detector.advance(twists, time); }
 
   private:
     ContactDetector& m_detector;
@@ -61,6 +63,14 @@ double speedOf(const btCollisionObject& object) {
     if (const auto* body = btRigidBody::upcast(&object)) return double(body->getLinearVelocity().length());
     if (const auto* link = btMultiBodyLinkCollider::upcast(&object)) return twistOf(*link).head<3>().norm();
     return 0.0;
+}
+
+/// Where Bullet takes a body with a twist in a step: it does not let it turn by more than a certain angle.
+Frame ledByBullet(const Obstacle& obstacle, const Vec6& twist, double h) {
+    btTransform end;
+    btTransformUtil::integrateTransform(toBullet(obstacle.start), toBullet(Vec3(twist.head<3>())),
+                                        toBullet(Vec3(twist.tail<3>())), btScalar(h), end);
+    return fromBullet(end);
 }
 
 /// Puts a free body that has moved already where the solve of its motion, which followed, lets it be.
@@ -97,6 +107,12 @@ struct ShellWorld::Impl {
     std::map<const ShellBody*, IslandSolver> solvers;  ///< of each island, by its first shell
     CarriedVertices carried;
     FastBodies::Solved solved{&memory};
+    /// Of a body whose step was solved in parts, where Bullet's one twist takes it elsewhere than it was solved to go.
+    struct Alteration {
+        int objectId;
+        Frame led, end;
+    };
+    std::pmr::unordered_map<const btCollisionObject*, Alteration> alterations{&memory};
     std::unordered_map<const btCollisionObject*, Push> pushes;
     ContactManifolds manifolds;
     ShellChecks checks;
@@ -179,6 +195,7 @@ std::vector<std::string> ShellWorld::takeWarnings() {
 /// then the next solve looks at this configuration, and its impulses enter Bullet's next solve.
 void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     if (!(h > btScalar(0))) return;
+    alterBodies(*world, false);
     if (m_shells.empty()) return forgetPushes(*world);
     const double start = seconds();
     WorldReport report{.shells = size()};
@@ -257,6 +274,24 @@ void ShellWorld::solveNewcomers(btCollisionWorld& world, double h) {
             if (const auto known = m_impl->solved.find(obstacle.object); known != m_impl->solved.end())
                 moveAnew(world, obstacle, known->second, h);
     }
+    alterBodies(world, true);
+}
+
+/// Bodies that Bullet's one twist a step took elsewhere than they were solved to go. `isSolvedAnew`: Bullet had moved
+/// them before.
+void ShellWorld::alterBodies(btCollisionWorld& world, bool isSolvedAnew) {
+    const auto& objects = world.getCollisionObjectArray();
+    for (int i = 0; i < objects.size() && !m_impl->alterations.empty(); ++i) {
+        const auto found = m_impl->alterations.find(objects[i]);
+        btRigidBody* body = btRigidBody::upcast(objects[i]);
+        if (found == m_impl->alterations.end() || !body || body->isStaticOrKinematicObject()) continue;
+        const auto& [objectId, led, end] = found->second;
+        if (idOf(world, body) != objectId) continue;
+        const Frame strayed = led.inverse(Eigen::Isometry) * fromBullet(body->getWorldTransform());
+        body->setCenterOfMassTransform(toBullet(isSolvedAnew ? end : end * strayed));
+        world.updateSingleAabb(body);
+    }
+    m_impl->alterations.clear();
 }
 
 void ShellWorld::moveShells(btCollisionWorld& world, double h) {
@@ -287,6 +322,9 @@ void ShellWorld::solveIsland(Island& island, double h) {
     input.rigidContacts = island.rigidContacts;
     input.anchors = island.anchors;
     input.contacts = island.pairs.empty() ? nullptr : &timed;
+    input.inOnePiece = std::any_of(island.obstacles.begin(), island.obstacles.end(), [](const Obstacle& obstacle) {
+        return !obstacle.body.prescribed && !btRigidBody::upcast(obstacle.object);
+    });
     input.restingSpeed = double(m_world.getSolverInfo().m_restitutionVelocityThreshold);
     input.clock = &seconds;
     input.team = m_impl->team.get();
@@ -294,11 +332,10 @@ void ShellWorld::solveIsland(Island& island, double h) {
     const StepReport& report = m_impl->solvers[island.shells.front()].solve(input);
     m_report.secondsSolve += seconds() - start;
     m_report.times += report.times;
-    accept(island, report, coupled, h * gravity);
+    accept(island, report, coupled, h);
 }
 
-void ShellWorld::accept(Island& island, const StepReport& report, std::span<const CoupledBody> coupled,
-                        const Vec3& pendingGravity) {
+void ShellWorld::accept(Island& island, const StepReport& report, std::span<const CoupledBody> coupled, double h) {
     m_report.pcgIterations += report.pcgIterations;
     m_report.solves += report.solves;
     m_report.passedSteps += report.passed || report.mayPass ? 1 : 0;
@@ -313,24 +350,29 @@ void ShellWorld::accept(Island& island, const StepReport& report, std::span<cons
     for (ShellBody* shell : island.shells) {
         shell->m_contacts.clear();
         shell->m_hasVelocity = report.finite;  // a rejected step: stands still, and is solved afresh
-        shell->m_pendingGravity = pendingGravity;
+        shell->m_pendingGravity = h * fromBullet(m_world.getGravity());
     }
     if (!report.finite) return;
+    const auto endOf = [&](int b) { return moved(island.obstacles[b].start, coupled[b].motion, 1.0); };
     for (const ContactImpulse& impulse : report.contacts) {
         ShellBody& shell = *island.shells[impulse.contact.shell];
         shell.note(shell.describe(impulse, *island.obstacles[impulse.contact.body].object));
         const auto& [contact, given, sticks, slip] = impulse;
         if (const Obstacle& obstacle = island.obstacles[contact.body];
             contact.isVertex() && !standsStill(*obstacle.object))
-            m_impl->carried.addTouching(shell, contact.vertices[0], obstacle, coupled[contact.body].twist,
-                                        contact.normal);
+            m_impl->carried.addTouching(shell, contact.vertices[0], obstacle, endOf(contact.body), contact.normal);
     }
     for (const Anchor& anchor : island.anchors)
         m_impl->carried.addTied(*island.shells[anchor.shell], anchor.vertex, island.obstacles[anchor.body],
-                                coupled[anchor.body].twist, anchor.point);
+                                endOf(anchor.body), anchor.point);
     for (std::size_t b = 0; b < coupled.size(); ++b) {
         react(*island.obstacles[b].object, coupled[b]);
-        if (!report.passed) m_impl->solved[island.obstacles[b].object] = coupled[b].twist;
+        btCollisionObject* object = island.obstacles[b].object;
+        const bool isAltered = !coupled[b].prescribed && coupled[b].motion != h * coupled[b].twist;
+        if (!report.passed || isAltered) m_impl->solved[object] = coupled[b].twist;  // a bent way is not swept again
+        if (isAltered)
+            m_impl->alterations[object] = {idOf(m_world, object), ledByBullet(island.obstacles[b], coupled[b].twist, h),
+                                           endOf(int(b))};
     }
 }
 

@@ -106,6 +106,29 @@ void missiles(const std::string& shape, double speed, int starts) {
         shape.c_str(), speed, stopped, starts, silent, most);
 }
 
+/// Sheets of 1 m that come down at 4.6 to 10 m/s, from 10 to 60 cm, over a board of 40 x 30 cm in steps of 1/60 s.
+void shelf(double thick, int starts) {
+    int held = 0, silent = 0, unsettled = 0, solves = 0;
+    Draw draw(11);
+    for (int i = 0; i < starts; ++i) {
+        const Vec3 from(draw.between(-0.05, 0.05), draw.between(0.1, 0.6), draw.between(-0.05, 0.05));
+        const double speed = draw.between(4.6, 10.0);
+        Shelf scene(thick, from, speed);
+        for (int k = 0; k < int(60.0 * (from.y() / speed + 0.7)); ++k) {
+            scene.step(kStep);
+            solves = std::max(solves, scene.shells->lastStep().solves);
+        }
+        held += scene.isHeld();
+        silent += !scene.isHeld() && scene.shells->lastStep().passedSteps == 0;
+        unsettled += scene.shells->lastStep().unsettledSteps;
+    }
+    std::printf(
+        "sheet over a board of %4.3g cm    %3d of %d held, %d silently through; %d steps unsettled, at most %d solves "
+        "in "
+        "one\n",
+        1e2 * thick, held, starts, silent, unsettled, solves);
+}
+
 /// After 10 s that it has to come to rest.
 void ballAtRest(int cells, int steps) {
     RestingBall resting(cells);
@@ -131,6 +154,7 @@ void runAll(int starts) {
     for (const double ratio : {1e-3, 1e-2, 1.0}) lightBall(ratio, starts);
     for (const char* shape : {"ball", "rod", "box", "mesh"})
         for (const double speed : {1.5, 3.0, 5.0, 15.0, 60.0}) missiles(shape, speed, starts);
+    for (const double thick : {0.01, 0.015, 0.02, 0.025}) shelf(thick, starts);
     for (const int cells : {11, 12, 16, 24}) ballAtRest(cells, 500 * starts);
 }
 

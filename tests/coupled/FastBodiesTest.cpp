@@ -29,7 +29,7 @@ TEST_P(Bullet, NeverPassesSilentlyAndGainsNoEnergy) {
     }
     const bool through = !scene.isAbove(ball);
     EXPECT_TRUE(!through || scene.shells->lastStep().passedSteps > 0);
-    EXPECT_LT(most, 50);  // wanted: 1.03; 0.1 kg reaches 21 for a step, the others stay below 1.03
+    EXPECT_LT(most, 1.03);
     EXPECT_TRUE(std::isfinite(double(ball.getLinearVelocity().length2())));
     EXPECT_TRUE(scene.sheet.shell().positions().allFinite());
 }
@@ -53,10 +53,8 @@ TEST_P(Missile, NeverPassesSilently) {
         scene.step(1.0 / 60);
         fastest = std::max(fastest, double(body.getLinearVelocity().length()));
     }
-    // Wanted: stopped, and the sheet's energy with the body's never above the start's. Measured: at 0.2 m half of them
-    // pass, with passedSteps > 0, and while they are at the sheet its membrane may store up to 3000 times the energy.
     EXPECT_TRUE(scene.isAbove(body) || scene.shells->lastStep().passedSteps > 0);
-    EXPECT_LT(fastest, 80.0);  // wanted: 40.1. Measured: that, but for a rod launched at 0.2 m, in some roundings 45
+    EXPECT_LT(fastest, 40.1);
     EXPECT_TRUE(scene.sheet.shell().positions().allFinite());
 }
 INSTANTIATE_TEST_SUITE_P(Launches, Missile,
@@ -79,13 +77,13 @@ TEST_P(SlowMissile, IsStopped) {
         const double start = energy(scene).total();
         for (int i = 0; i < 25; ++i) {
             scene.step(1.0 / 60);
-            EXPECT_LT(energy(scene).total(), 1.5 * start) << "from " << height;
+            EXPECT_LT(energy(scene).total(), 1.2 * start) << "from " << height;  // wanted: 1.01
         }
         const bool isAbove = scene.isAbove(body);
         EXPECT_TRUE(isAbove || scene.shells->lastStep().passedSteps > 0) << "from " << height;
         stopped += isAbove;
     }
-    EXPECT_GE(stopped, speed < 1.0 ? 6 : 4);  // wanted: 6
+    EXPECT_EQ(stopped, 6);
 }
 INSTANTIATE_TEST_SUITE_P(Speeds, SlowMissile,
                          ::testing::Combine(::testing::Values("box", "mesh"), ::testing::Values(0.7, 1.5, 2.0, 4.0)));
@@ -118,6 +116,41 @@ TEST_P(Board, IsNotPassedByASheet) {
 INSTANTIATE_TEST_SUITE_P(Speeds, Board,
                          ::testing::Combine(::testing::Values("box", "mesh"),
                                             ::testing::Values(2.0, 5.0, 20.0, 100.0, 400.0)));
+
+/// Past the board's edges the sheet goes several times its thickness in a step, and the edges would cut through it.
+class SmallBoard : public ::testing::TestWithParam<double> {};
+
+TEST_P(SmallBoard, HoldsASheetThatHangsOverIt) {
+    for (const double thick : {0.01, 0.025})
+        for (const double height : {0.15, 0.37}) {
+            Shelf scene(thick, {0.03, height, -0.02}, GetParam());
+            scene.run(height / GetParam() + 0.5, kStep);
+            EXPECT_TRUE(scene.isHeld()) << thick << " m thick, from " << height << " m";
+        }
+}
+INSTANTIATE_TEST_SUITE_P(Speeds, SmallBoard, ::testing::Values(4.6, 7.0, 10.0));
+
+/// A ball against a free sheet: in a step that is taken in parts, too, each gets what the other gives.
+TEST(FastBodies, KeepMomentum) {
+    BulletScene scene(0.0);
+    auto& sheet = scene.shells->add(squareSheet(1, 20), trampolineCloth());
+    auto& ball = scene.addSphere(0.05, 0.2, btVector3(btScalar(0.013), btScalar(2.4), btScalar(0.021)));
+    ball.setLinearVelocity(btVector3(0, -60, 0));
+    const Vec3 start = jacket::testing::totalMomentum(scene);
+    double most = 0.0;
+    int solves = 0;
+    for (int i = 0; i < 20; ++i) {
+        const Vec3 before = toVec3(ball.getLinearVelocity());
+        scene.step(kStep);
+        Vec3 given = Vec3::Zero();
+        for (const BodyContact& contact : sheet.contacts()) given -= contact.impulse;
+        most = std::max(most, (given - 0.2 * (toVec3(ball.getLinearVelocity()) - before)).norm());
+        solves = std::max(solves, scene.shells->lastStep().solves);
+    }
+    EXPECT_GT(solves, 12);  // more than an attempt at the whole step has
+    EXPECT_LT(most, bulletTolerance(1e-9, 1e-5));
+    EXPECT_LT((jacket::testing::totalMomentum(scene) - start).norm(), bulletTolerance(1e-9, 1e-4));
+}
 
 }  // namespace
 }  // namespace jacket::bullet::testing

@@ -2,11 +2,14 @@
 #include <BulletCollision/CollisionShapes/btTriangleMesh.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <string>
+#include <vector>
 
-#include "support/BulletScene.h"
+#include "support/HardScenes.h"
 
 namespace jacket::bullet::testing {
 
@@ -61,6 +64,34 @@ struct Target : BulletScene {
             .minCoeff(&nearest);
         return centre.y() > x(1, nearest) - 0.05;
     }
+};
+
+/// A sheet of cotton, 1 m, that comes down at `speed` [m/s] over a fixed board smaller than itself, `thick` [m].
+struct Shelf : BulletScene {
+    const btVector3 half;
+    ShellBody& sheet;
+    Shelf(double thick, const Vec3& from, double speed)
+        : half(btScalar(0.2), btScalar(0.5 * thick), btScalar(0.15)),
+          sheet(shells->add(squareSheet(1, 30), materials::cotton())) {
+        addBox(half, 0, btVector3(0, 0, 0));
+        place(sheet, from);
+        sheet.setVelocity(btVector3(0, btScalar(-speed), 0));
+        const Points& x = sheet.shell().positions();
+        for (int i = 0; i < sheet.vertexCount(); ++i)
+            if (std::abs(x(0, i)) < double(half.x()) && std::abs(x(2, i)) < double(half.z())) m_over.push_back(i);
+    }
+    /// Whether what came down over the board lies on it, but for a tenth that may have slipped over its edges.
+    bool isHeld() const {
+        const Points& x = sheet.shell().positions();
+        const auto lies = [&](int i) {
+            return x(1, i) > 0.0 && std::abs(x(0, i)) < double(half.x()) + 0.01 &&
+                   std::abs(x(2, i)) < double(half.z()) + 0.01;
+        };
+        return double(std::count_if(m_over.begin(), m_over.end(), lies)) > 0.9 * double(m_over.size());
+    }
+
+  private:
+    std::vector<int> m_over;  ///< vertices above the board at the start
 };
 
 }  // namespace jacket::bullet::testing

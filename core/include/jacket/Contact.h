@@ -30,6 +30,7 @@ struct CoupledBody {
     bool prescribed = false;      ///< static, kinematic or sleeping: moves with freeTwist whatever the shells do
     Vec6 twist = Vec6::Zero();    ///< out: solved twist at the end of the step, to the solve's tolerance
     Vec6 impulse = Vec6::Zero();  ///< out: what the shells gave it, exactly, about its centre of mass [N s, N m s]
+    Vec6 motion = Vec6::Zero();   ///< out: how it moves in the step: displacement and rotation vector [m, rad]
 };
 
 /// An off-diagonal block of the bodies' common mass matrix: joints, or rigid contacts, make the momentum of one body
@@ -115,6 +116,8 @@ class ContactDetector {
     /// could have passed a shell between two poses. `gap` is how far that motion brings them together along the normal
     /// until they touch, `normal` and `point` are those of that moment; `time` is when it is.
     virtual void sweep(const ContactSweep&, std::vector<Contact>&) {}
+    /// Bodies have moved by `twists`, one per body, for a time [s]: poses are counted from there on.
+    virtual void advance(std::span<const Vec6>, double) {}
 };
 
 }  // namespace jacket

@@ -18,6 +18,7 @@ struct IslandInput {
     std::span<const RigidContact> rigidContacts{};
     std::span<const Anchor> anchors{};
     ContactDetector* contacts = nullptr;  ///< none: no contacts
+    bool inOnePiece = false;              ///< some body can move by nothing but one twist in a step
     double restingSpeed = 0.2;            ///< contacts that close no faster do not bounce [m/s]
     double (*clock)() = nullptr;          ///< [s]; null: no times are taken
     WorkerTeam* team = nullptr;           ///< shares the work of large islands; the same bits with and without

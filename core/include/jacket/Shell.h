@@ -174,6 +174,7 @@ class Shell {
   private:
     friend class IslandSolver;
     friend class StaticSolver;
+    friend class StepParts;
     void rebuild();  ///< energies, after the rest shape or how it is clamped changed
     void setMasses();
     void flow();

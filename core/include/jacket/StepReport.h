@@ -38,6 +38,13 @@ struct StepReport {
     double deepestGap = 0.0;  ///< most negative predicted gap that was left at the end of the step [m], <= 0
     StepTimes times;          ///< all zero without a clock
     std::vector<ContactImpulse> contacts;  ///< those that carried an impulse
+
+    /// What another attempt at the step took.
+    void addCosts(const StepReport& other) {
+        pcgIterations += other.pcgIterations;
+        solves += other.solves;
+        times += other.times;
+    }
 };
 
 }  // namespace jacket

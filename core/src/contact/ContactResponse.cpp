@@ -151,6 +151,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     findFast();
     if (isQuick() && (isAnyBouncy() || m_anyFast)) m_care = inFull;
     if (m_anyFast) sweepAtStart();
+    if (m_anyFast && numbering.mayBeShorter && !hasFreeBodies() && !isAnyBouncy()) m_care = kInPassing;
     keepEarliest();
 }
 

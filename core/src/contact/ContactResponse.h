@@ -36,6 +36,7 @@ class ContactResponse {
         const std::vector<double>& stepOf;     ///< length of the step as each shell's integrator counts it [s]
         bool isAnyFactored;                    ///< some shell: completely
         bool givesWay;                         ///< false: pushOut would strain some shell
+        bool mayBeShorter;                     ///< the step, if fast contacts do not settle soon
     };
     /// Contacts at the start of the step, and the position alteration y of vertices that stand inside a body.
     /// `expected`: velocities at the end of the step as they would be if the last step's change went on; kept by
@@ -120,6 +121,8 @@ class ContactResponse {
     /// So does sheet metal that walls press, and no free body is thrown if it takes long.
     static constexpr Care kAtLength{48, 1e-3};
     static constexpr Care kAmongWalls{6, 0.02};
+    /// Where walls are fast and more does not settle, shorter steps are the quicker way: see StepParts.
+    static constexpr Care kInPassing{12, 1e-3};
     /// What a contact's point is moved by, along the normal, at the end of the step.
     struct Push {
         const Contact* contact;

@@ -11,7 +11,7 @@
 namespace jacket {
 namespace {
 
-constexpr int kRowsAtATime = 1024;  ///< that a thread of a team takes
+constexpr int kVerticesAtATime = 1024;  ///< that a thread of a team takes
 
 TriangleNormal normalOf(const int* v, const Points& x) {
     const Vec3 x0 = x.col(v[0]), x1 = x.col(v[1]), x2 = x.col(v[2]);
@@ -374,7 +374,7 @@ void PatchEnergy::addTo(StepSystem& system, const Points& x, HessianKind kind) c
     pad(x);
     const TermSink sink = system.sink();
     const ConstantRows rows = rowsTimes(m_padded, m_constant);
-    runRanges(system.team(), static_cast<int>(x.cols()), kRowsAtATime,
+    runRanges(system.team(), static_cast<int>(x.cols()), kVerticesAtATime,
               [&](int begin, int end) { addConstantGradient(rows, begin, end, sink.gradientFactor, sink.rhs); });
     for (const Element& e : m_elements) {
         if (e.mirrored >= 0) addMirrored(e, system, x);

@@ -5,7 +5,7 @@
 namespace jacket {
 namespace {
 
-constexpr int kRowsAtATime = 512;
+constexpr int kBlockRowsAtATime = 512;
 
 struct Blocks {
     const int *lowerStart, *lowerColumn, *upperStart, *upperRow, *upperSlot;
@@ -61,7 +61,7 @@ void BlockProduct::multiply(const BlockMatrix& matrix, const double* x, double* 
                         matrix.lower().empty() ? nullptr : matrix.lower().data()->data(),
                         beside ? beside->beside() : ConstantHessian::Rows{},
                         matrix.besideFactor()};
-    runRanges(team, matrix.size(), kRowsAtATime, [&](int begin, int end) { multiplyKernel(blocks, begin, end, x, y); });
+    runRanges(team, matrix.size(), kBlockRowsAtATime, [&](int begin, int end) { multiplyKernel(blocks, begin, end, x, y); });
 }
 
 void BlockProduct::addColumn(const BlockMatrix& matrix, int vertex, const Vec3& change, double* y) const {

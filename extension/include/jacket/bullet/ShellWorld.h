@@ -82,10 +82,10 @@ class ShellWorld : public btActionInterface {
     void releaseAnchors(btCollisionWorld& world);
     void followGravity(double h);
     void solveNewcomers(btCollisionWorld& world, double h);
+    void alterBodies(btCollisionWorld& world, bool isSolvedAnew);
     void moveShells(btCollisionWorld& world, double h);
     void solveIsland(Island& island, double h);
-    void accept(Island& island, const StepReport& report, std::span<const CoupledBody> coupled,
-                const Vec3& pendingGravity);
+    void accept(Island& island, const StepReport& report, std::span<const CoupledBody> coupled, double h);
     void react(btCollisionObject& object, const CoupledBody& coupled);
     void forgetPushes(const btCollisionWorld& world);
     void updateAllBounds(double h);
