@@ -167,10 +167,10 @@ TEST(Threads, FindStripsThatOnlySeparatorsJoin) {
         return std::upper_bound(starts.begin(), starts.end(), row) - starts.begin() - 1;
     };
     for (int row = 0; row < compact.size(); ++row)
-        for (int k = compact.rowBegin(row); k < compact.rowEnd(row); ++k) {
-            const auto a = partOf(row), b = partOf(compact.column(k));
+        compact.forColumns(row, [&](int column) {
+            const auto a = partOf(row), b = partOf(column);
             EXPECT_TRUE(a == b || a == 2 || b == 2) << row;
-        }
+        });
 }
 
 }  // namespace

@@ -27,12 +27,11 @@ void measureDistances(const CompactMatrix& matrix, const std::vector<int>& rows,
             queue.push_back(rows[unseen]);
         }
         const int row = queue[done];
-        for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) {
-            const int next = matrix.column(k);
-            if (!inside[next] || distance[next] >= 0) continue;
+        matrix.forColumns(row, [&](int next) {
+            if (!inside[next] || distance[next] >= 0) return;
             distance[next] = distance[row] + 1;
             queue.push_back(next);
-        }
+        });
     }
 }
 
@@ -86,7 +85,7 @@ std::vector<std::vector<int>> patchNeighbours(const CompactMatrix& matrix, const
                 neighbours[from].push_back(to);
     };
     for (int row = 0; row < matrix.size(); ++row) {
-        for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) join(row, matrix.column(k));
+        matrix.forColumns(row, [&](int column) { join(row, column); });
         for (int k = matrix.besideBegin(row); k < matrix.besideEnd(row); ++k) join(row, matrix.besideColumn(k));
     }
     return neighbours;
@@ -129,7 +128,8 @@ JACKET_INLINE void addModes(Float4 r, const Float4* t, double* sums) {
 }
 
 struct Galerkin {
-    const int *patchStart, *members, *rowStart, *column, *target, *patchOf;
+    CompactMatrix::Pattern pattern;
+    const int *patchStart, *members, *target, *patchOf;
     const int *besideStart, *besideColumn, *scalarStart, *scalars;
     const float *blocks, *rowSums, *beside, *arms;
     const char *isHeld, *isNearHeld;  ///< see CoarseSpace
@@ -143,16 +143,31 @@ JACKET_INLINE void prefetch(const void* from, const void* to) {
     for (const char* at = static_cast<const char*>(from); at < to; at += kLine) __builtin_prefetch(at);
 }
 
-/// Of a patch's rows. Only its own blocks of P^T A P are written to, here and below.
+/// The part of block (i, j) in row i of P^T A P; it is block k below the diagonal, or that one's transpose. `own`: what
+/// the row has with its own patch. Only blocks of the row's patch are written to, here and below.
+JACKET_INLINE void addBlock(const Galerkin& g, int i, int j, int k, const Float4 (&block)[3], Float4* own) {
+    const Float4 ri = load4(g.arms + 4 * i), rj = load4(g.arms + 4 * j);
+    if (g.patchOf[j] == g.patchOf[i]) return addRotations(block, rj - ri, own + 3);
+    const Float4 minus[3] = {-block[0], -block[1], -block[2]};
+    for (int c = 0; c < 3; ++c) own[c] += minus[c];
+    addRotations(minus, ri, own + 3);
+    if (g.patchOf[j] > g.patchOf[i]) return;
+    Float4 other[6] = {block[0], block[1], block[2]};
+    addRotations(block, rj, other + 3);
+    addModes(ri, other, g.sums + kSums * g.target[k]);
+}
+
+/// Of a patch's rows.
 JACKET_KERNEL void addBlocks(const Galerkin& g, int patch) {
+    const CompactMatrix::Pattern& p = g.pattern;
     for (int m = g.patchStart[patch]; m < g.patchStart[patch + 1]; ++m) {
         const int i = g.members[m];
         if (m + kAhead < g.patchStart[patch + 1]) {
             const int next = g.members[m + kAhead];
             prefetch(g.rowSums + 9 * next, g.rowSums + 9 * next + 9);
-            prefetch(g.blocks + 9 * g.rowStart[next], g.blocks + 9 * g.rowStart[next + 1]);
-            prefetch(g.column + g.rowStart[next], g.column + g.rowStart[next + 1]);
-            prefetch(g.target + g.rowStart[next], g.target + g.rowStart[next + 1]);
+            prefetch(g.blocks + 9 * p.lowerStart[next], g.blocks + 9 * p.lowerStart[next + 1]);
+            prefetch(p.lowerColumn + p.lowerStart[next], p.lowerColumn + p.lowerStart[next + 1]);
+            prefetch(g.target + p.lowerStart[next], g.target + p.lowerStart[next + 1]);
         }
         if (g.isNearHeld[i]) continue;  // see addHeldRow
         const Float4 ri = load4(g.arms + 4 * i);
@@ -160,21 +175,14 @@ JACKET_KERNEL void addBlocks(const Galerkin& g, int patch) {
         Float4 own[6] = {load4(rowSum), load4(rowSum + 3), load4(rowSum + 6)};
         const Float4 sum[3] = {own[0], own[1], own[2]};
         addRotations(sum, ri, own + 3);
-        for (int k = g.rowStart[i]; k < g.rowStart[i + 1]; ++k) {
+        for (int k = p.lowerStart[i]; k < p.lowerStart[i + 1]; ++k) {
             const float* a = g.blocks + 9 * k;
-            const Float4 block[3] = {load4(a), load4(a + 3), load4(a + 6)};
-            const Float4 rj = load4(g.arms + 4 * g.column[k]);
-            if (g.patchOf[g.column[k]] == g.patchOf[i]) {
-                addRotations(block, rj - ri, own + 3);
-                continue;
-            }
-            const Float4 minus[3] = {-block[0], -block[1], -block[2]};
-            for (int c = 0; c < 3; ++c) own[c] += minus[c];
-            addRotations(minus, ri, own + 3);
-            if (g.target[k] < 0) continue;
-            Float4 other[6] = {block[0], block[1], block[2]};
-            addRotations(block, rj, other + 3);
-            addModes(ri, other, g.sums + kSums * g.target[k]);
+            addBlock(g, i, p.lowerColumn[k], k, {load4(a), load4(a + 3), load4(a + 6)}, own);
+        }
+        for (int k = p.upperStart[i]; k < p.upperStart[i + 1]; ++k) {
+            Float4 block[3];
+            loadTransposed(g.blocks + 9 * p.upperBlock[k], block);
+            addBlock(g, i, p.upperColumn[k], p.upperBlock[k], block, own);
         }
         addModes(ri, own, g.sums + kSums * g.patchOf[i]);
     }
@@ -245,15 +253,16 @@ void addHeldRow(const Galerkin& g, int i, const std::vector<const Mat3*>& free) 
     const Block si = projector(i);
     Block own = Eigen::Map<const Block>(g.rowSums + 9 * i);
     double* ownSums = g.sums + kSums * g.patchOf[i];
-    for (int k = g.rowStart[i]; k < g.rowStart[i + 1]; ++k) {
-        const Eigen::Map<const Block> block(g.blocks + 9 * k);
+    const auto addPair = [&](int j, int k, const Block& block) {
         own -= block;
-        const int j = g.column[k];
-        double* sums = g.patchOf[j] == g.patchOf[i] ? ownSums
-                       : g.target[k] < 0            ? nullptr
-                                                    : g.sums + kSums * g.target[k];
-        if (sums) add(si * block * projector(j), j, sums);
-    }
+        if (g.patchOf[j] > g.patchOf[i]) return;
+        add(si * block * projector(j), j, g.patchOf[j] == g.patchOf[i] ? ownSums : g.sums + kSums * g.target[k]);
+    };
+    const auto blockAt = [&](int k) { return Eigen::Map<const Block>(g.blocks + 9 * k); };
+    const CompactMatrix::Pattern& p = g.pattern;
+    for (int k = p.lowerStart[i]; k < p.lowerStart[i + 1]; ++k) addPair(p.lowerColumn[k], k, blockAt(k));
+    for (int k = p.upperStart[i]; k < p.upperStart[i + 1]; ++k)
+        addPair(p.upperColumn[k], p.upperBlock[k], blockAt(p.upperBlock[k]).transpose());
     add(si * own * si, i, ownSums);
 }
 
@@ -273,14 +282,17 @@ CoarseSpace::CoarseSpace(const CompactMatrix& matrix)
 }
 
 void CoarseSpace::findTargets(const CompactMatrix& matrix) {
-    m_target.reserve(matrix.rowEnd(matrix.size() - 1));
+    const CompactMatrix::Pattern pattern = matrix.pattern();
+    m_target.reserve(matrix.lowerCount());
     m_scalarStart.assign(1, 0);
     std::vector<std::pair<int, int>> foreign;  // of another patch' block, and place
     std::vector<int> mirrored;
     for (int row = 0; row < matrix.size(); ++row) {
         const int p = m_patchOf[row];
-        for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k)
-            m_target.push_back(m_factor.index(p, m_patchOf[matrix.column(k)]));
+        for (int k = pattern.lowerStart[row]; k < pattern.lowerStart[row + 1]; ++k) {
+            const int q = m_patchOf[pattern.lowerColumn[k]];
+            m_target.push_back(m_factor.index(std::max(p, q), std::min(p, q)));
+        }
         foreign.clear();
         mirrored.clear();
         for (int k = matrix.besideBegin(row); k < matrix.besideEnd(row); ++k) {
@@ -371,16 +383,16 @@ void CoarseSpace::build(const CompactMatrix& matrix, const Points& positions, co
         if (!free[row]) continue;
         m_isHeld[row] = m_isNearHeld[row] = 1;
         ++m_heldCount;
-        for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) m_isNearHeld[matrix.column(k)] = 1;
+        matrix.forColumns(row, [&](int column) { m_isNearHeld[column] = 1; });
     }
     m_sums.assign(kSums * m_factor.blockCount(), 0.0);
     m_moments.assign(kMoments * m_factor.blockCount(), 0.0f);
     m_besideSums.assign(m_factor.blockCount(), 0.0);
     const auto view = matrix.view();
-    const Galerkin g{m_patchStart.data(), m_members.data(), view.rowStart,       view.column,          m_target.data(),
-                     m_patchOf.data(),    view.besideStart, view.besideColumn,   m_scalarStart.data(), m_scalars.data(),
-                     view.blocks,         view.rowSums,     view.beside,         m_arms.data(),        m_isHeld.data(),
-                     m_isNearHeld.data(), m_sums.data(),    m_besideSums.data(), m_moments.data()};
+    const Galerkin g{view.pattern,     m_patchStart.data(), m_members.data(),     m_target.data(),  m_patchOf.data(),
+                     view.besideStart, view.besideColumn,   m_scalarStart.data(), m_scalars.data(), view.blocks,
+                     view.rowSums,     view.beside,         m_arms.data(),        m_isHeld.data(),  m_isNearHeld.data(),
+                     m_sums.data(),    m_besideSums.data(), m_moments.data()};
     runParts(team, patchCount(), [&](int patch) {
         addBlocks(g, patch);
         for (int m = m_patchStart[patch]; m < m_patchStart[patch + 1]; ++m)

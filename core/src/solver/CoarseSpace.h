@@ -43,7 +43,7 @@ class CoarseSpace {
     std::vector<int> m_patchOf;                ///< of each row; patches are numbered as they are eliminated
     std::vector<int> m_patchStart, m_members;  ///< rows of each patch
     BlockFactor m_factor;
-    std::vector<int> m_target;  ///< factor's block of each block of the matrix; -1: its mirror image has it
+    std::vector<int> m_target;  ///< factor's block of each block below the matrix's diagonal, or of its transpose
     /// Of each row three groups of places of scalars: in the patch and below the diagonal; beyond it, each with the
     /// factor's block; those whose mirror images are such.
     std::vector<int> m_scalarStart, m_scalars;

@@ -11,10 +11,12 @@ namespace {
 
 /// What a factor is made of, as plain memory for the kernels. Blocks are nine numbers by columns.
 struct Factoring {
-    const int *vertexOf, *rowStart, *column, *source, *pairStart, *pairs, *upperOf, *inversePlace, *scaledPlace;
+    const int* vertexOf;
+    CompactMatrix::Pattern pattern;
+    const int *pairStart, *pairs, *inversePlace, *scaledPlace;
     FilteredMatrix::Blocks diagonal, values;
     double *inverse, *scaled;
-    float *root, *rootTransposed, *lower, *upper;
+    float *root, *lower;
     double shift;
 };
 
@@ -81,12 +83,12 @@ JACKET_INLINE Triangular triangular(const Double4 (&a)[3]) {
 
 /// W = D^-1/2 L^-1 of a block, so that its inverse is W^T W: in single precision this keeps the direction in which a
 /// thin shell is soft apart from the others, and is positive whatever rounding does.
-JACKET_INLINE void storeRoot(const Triangular& t, float* root, float* rootTransposed, double* inverse) {
+JACKET_INLINE void storeRoot(const Triangular& t, float* root, double* inverse) {
     const double w0 = 1.0 / std::sqrt(t.d0), w1 = 1.0 / std::sqrt(t.d1), w2 = 1.0 / std::sqrt(t.d2);
     const double w[9] = {w0, -t.l10 * w1, (t.l10 * t.l21 - t.l20) * w2, 0.0, w1, -t.l21 * w2, 0.0, 0.0, w2};
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
-            root[3 * j + i] = rootTransposed[3 * i + j] = static_cast<float>(w[3 * j + i]);
+            root[3 * j + i] = static_cast<float>(w[3 * j + i]);
             inverse[3 * j + i] = w[3 * i] * w[3 * j] + w[3 * i + 1] * w[3 * j + 1] + w[3 * i + 2] * w[3 * j + 2];
         }
 }
@@ -94,8 +96,8 @@ JACKET_INLINE void storeRoot(const Triangular& t, float* root, float* rootTransp
 /// What a row will read that is not where the last rows read.
 JACKET_INLINE void prefetchRow(const Factoring& f, int row) {
     __builtin_prefetch(blockAt(f.diagonal, f.vertexOf[row]));
-    for (int k = f.rowStart[row]; k < f.rowStart[row + 1]; ++k) {
-        const int source = f.source[k];
+    for (int k = f.pattern.lowerStart[row]; k < f.pattern.lowerStart[row + 1]; ++k) {
+        const int source = f.pattern.source[k];
         const double* const values = blockAt(f.values, source >= 0 ? source : ~source);
         __builtin_prefetch(values);
         __builtin_prefetch(values + 8);
@@ -108,16 +110,17 @@ JACKET_KERNEL bool factorKernel(const Factoring& factoring, int begin, int end, 
     constexpr double kLeast = 1e-3;
     constexpr int kRowsAhead = 4;   // rows between prefetch and use
     const Factoring f = factoring;  // nobody writes there
+    const CompactMatrix::Pattern& p = f.pattern;
     for (int i = begin; i < end; ++i) {
         if (i + kRowsAhead < end) prefetchRow(f, i + kRowsAhead);
         Double4 d[3] = {};
         loadBlock(blockAt(f.diagonal, f.vertexOf[i]), d);
         const Triangular before = triangular(d);
         for (Double4& column : d) column *= 1.0 + f.shift;
-        for (int k = f.rowStart[i]; k < f.rowStart[i + 1]; ++k) {
+        for (int k = p.lowerStart[i]; k < p.lowerStart[i + 1]; ++k) {
             Double4 block[3] = {}, left[3] = {};
-            const bool isLower = f.source[k] >= 0;
-            loadBlock(blockAt(f.values, isLower ? f.source[k] : ~f.source[k]), block);
+            const bool isLower = p.source[k] >= 0;
+            loadBlock(blockAt(f.values, isLower ? p.source[k] : ~p.source[k]), block);
             if (!isLower) transpose(block);
             for (int pair = f.pairStart[k]; pair < f.pairStart[k + 1]; ++pair) {
                 loadBlock(row + 9 * f.pairs[2 * pair], left);
@@ -125,40 +128,40 @@ JACKET_KERNEL bool factorKernel(const Factoring& factoring, int begin, int end, 
             }
             double* const scaled = f.scaled + 9 * f.scaledPlace[k];
             storeBlock(block, scaled);
-            const double* inverse = f.inverse + 9 * f.inversePlace[f.column[k]];
+            const double* inverse = f.inverse + 9 * f.inversePlace[p.lowerColumn[k]];
             for (int column = 0; column < 3; ++column)
                 left[column] = block[0] * inverse[3 * column] + block[1] * inverse[3 * column + 1] +
                                block[2] * inverse[3 * column + 2];
-            storeBlock(left, row + 9 * (k - f.rowStart[i]));
+            storeBlock(left, row + 9 * (k - p.lowerStart[i]));
             subtractTransposedProduct(left, scaled, d);
             storeRounded(left, f.lower + 9 * k);
-            transpose(left);
-            storeRounded(left, f.upper + 9 * f.upperOf[k]);
         }
         const Triangular t = triangular(d);
         if (!(t.d0 > kLeast * before.d0 && t.d1 > kLeast * before.d1 && t.d2 > kLeast * before.d2)) return false;
         if (!(t.d0 > 0.0 && t.d1 > 0.0 && t.d2 > 0.0)) return false;
-        storeRoot(t, f.root + 9 * i, f.rootTransposed + 9 * i, f.inverse + 9 * f.inversePlace[i]);
+        storeRoot(t, f.root + 9 * i, f.inverse + 9 * f.inversePlace[i]);
     }
     return true;
 }
 
 JACKET_KERNEL void forwardKernel(const CompactFactor::Solving& solving, int begin, int end, const float* r, float* z) {
     const CompactFactor::Solving f = solving;  // nobody writes there
+    const CompactMatrix::Pattern& p = f.pattern;
     for (int i = begin; i < end; ++i) {
         Float4 sum = load4(r + 4 * i);
-        for (int k = f.rowStart[i]; k < f.rowStart[i + 1]; ++k)
-            sum -= times(f.lower + 9 * k, load4(z + 4 * f.column[k]));
+        for (int k = p.lowerStart[i]; k < p.lowerStart[i + 1]; ++k)
+            sum -= times(f.lower + 9 * k, load4(z + 4 * p.lowerColumn[k]));
         store4(z + 4 * i, sum);
     }
 }
 
 JACKET_KERNEL void backwardKernel(const CompactFactor::Solving& solving, int begin, int end, float* z) {
     const CompactFactor::Solving f = solving;  // nobody writes there
+    const CompactMatrix::Pattern& p = f.pattern;
     for (int i = end - 1; i >= begin; --i) {
-        Float4 sum = times(f.rootTransposed + 9 * i, times(f.root + 9 * i, load4(z + 4 * i)));
-        for (int k = f.upperStart[i]; k < f.upperStart[i + 1]; ++k)
-            sum -= times(f.upper + 9 * k, load4(z + 4 * f.upperColumn[k]));
+        Float4 sum = timesTransposed(f.root + 9 * i, times(f.root + 9 * i, load4(z + 4 * i)));
+        for (int k = p.upperStart[i]; k < p.upperStart[i + 1]; ++k)
+            sum -= timesTransposed(f.lower + 9 * p.upperBlock[k], load4(z + 4 * p.upperColumn[k]));
         store4(z + 4 * i, xyz0(sum));
     }
 }
@@ -166,18 +169,14 @@ JACKET_KERNEL void backwardKernel(const CompactFactor::Solving& solving, int beg
 }  // namespace
 
 CompactFactor::CompactFactor(const CompactMatrix& matrix)
-    : m_size(matrix.size()),
-      m_partStart(matrix.partStarts()),
-      m_vertexOf(matrix.vertexOf()),
-      m_rowStart(1, 0),
-      m_upperStart(1, 0) {
-    takePattern(matrix);
+    : m_matrix(matrix), m_size(matrix.size()), m_partStart(matrix.partStarts()) {
     findPairs();
     placeValues();
-    for (auto* perRow : {&m_root, &m_rootTransposed}) perRow->assign(9 * m_size + 3, 0.0f);
-    for (int row = 0; row < m_size; ++row) m_mostInRow = std::max(m_mostInRow, m_rowStart[row + 1] - m_rowStart[row]);
+    m_root.assign(9 * m_size + 3, 0.0f);
+    m_lower.assign(9 * static_cast<std::size_t>(matrix.lowerCount()) + 3, 0.0f);
+    const int* const start = matrix.pattern().lowerStart;
+    for (int row = 0; row < m_size; ++row) m_mostInRow = std::max(m_mostInRow, start[row + 1] - start[row]);
     m_rows.assign(9 * static_cast<std::size_t>(m_mostInRow) * stripCount(), 0.0);
-    for (auto* perBlock : {&m_lower, &m_upper}) perBlock->assign(9 * m_column.size() + 3, 0.0f);
 }
 
 int CompactFactor::Places::take() {
@@ -187,37 +186,18 @@ int CompactFactor::Places::take() {
     return place;
 }
 
-void CompactFactor::takePattern(const CompactMatrix& matrix) {
-    const std::size_t count = m_size > 0 ? matrix.rowEnd(m_size - 1) / 2 : 0;
-    for (auto* perBlock : {&m_column, &m_source, &m_upperColumn}) perBlock->reserve(count);
-    for (auto* perRow : {&m_rowStart, &m_upperStart}) perRow->reserve(m_size + 1);
-    for (int row = 0; row < m_size; ++row) {
-        for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) {
-            if (matrix.column(k) < row) {
-                m_column.push_back(matrix.column(k));
-                m_source.push_back(matrix.source(k));
-            } else {
-                m_upperColumn.push_back(matrix.column(k));
-            }
-        }
-        m_rowStart.push_back(static_cast<int>(m_column.size()));
-        m_upperStart.push_back(static_cast<int>(m_upperColumn.size()));
-    }
-}
-
 void CompactFactor::findPairs() {
-    std::vector<int> next(m_upperStart.begin(), m_upperStart.end() - 1);
-    m_upperOf.reserve(m_column.size());
-    m_pairStart.reserve(m_column.size() + 1);
+    const CompactMatrix::Pattern at = m_matrix.pattern();
+    m_pairStart.reserve(m_matrix.lowerCount() + 1);
     m_pairStart.assign(1, 0);
     for (int row = 0; row < m_size; ++row)
-        for (int k = m_rowStart[row]; k < m_rowStart[row + 1]; ++k) {
-            m_upperOf.push_back(next[m_column[k]]++);
-            int q = m_rowStart[m_column[k]];
-            const int qEnd = m_rowStart[m_column[k] + 1];
-            for (int p = m_rowStart[row]; p < k; ++p) {  // columns that the two rows share
-                while (q < qEnd && m_column[q] < m_column[p]) ++q;
-                if (q < qEnd && m_column[q] == m_column[p]) m_pairs.insert(m_pairs.end(), {p - m_rowStart[row], q});
+        for (int k = at.lowerStart[row]; k < at.lowerStart[row + 1]; ++k) {
+            int q = at.lowerStart[at.lowerColumn[k]];
+            const int qEnd = at.lowerStart[at.lowerColumn[k] + 1];
+            for (int p = at.lowerStart[row]; p < k; ++p) {  // columns that the two rows share
+                while (q < qEnd && at.lowerColumn[q] < at.lowerColumn[p]) ++q;
+                if (q < qEnd && at.lowerColumn[q] == at.lowerColumn[p])
+                    m_pairs.insert(m_pairs.end(), {p - at.lowerStart[row], q});
             }
             m_pairStart.push_back(static_cast<int>(m_pairs.size() / 2));
         }
@@ -226,12 +206,13 @@ void CompactFactor::findPairs() {
 
 /// Rows need those of the last few levels, or of the strips beside a separator: few of all.
 void CompactFactor::placeValues() {
-    std::vector<int> lastUse(m_column.size(), -1);  // row that needs L D
+    const int* const start = m_matrix.pattern().lowerStart;
+    std::vector<int> lastUse(m_matrix.lowerCount(), -1);  // row that needs L D
     for (int row = 0; row < m_size; ++row)
-        for (int pair = m_pairStart[m_rowStart[row]]; pair < m_pairStart[m_rowStart[row + 1]]; ++pair)
+        for (int pair = m_pairStart[start[row]]; pair < m_pairStart[start[row + 1]]; ++pair)
             lastUse[m_pairs[2 * pair + 1]] = row;
     m_inversePlace.resize(m_size);
-    m_scaledPlace.resize(m_column.size());
+    m_scaledPlace.resize(lastUse.size());
     Places inverse, scaled;
     for (std::size_t part = 0; part + 1 < m_partStart.size(); ++part) {
         inverse.keepTaken();  // other parts may be factored at the same time
@@ -247,24 +228,29 @@ void CompactFactor::placeValues() {
 
 /// Takes a row's place, and gives back those of its part, which begins with row `first`, that it is the last to need.
 void CompactFactor::placeInverse(int row, int first, Places& places) {
+    const CompactMatrix::Pattern at = m_matrix.pattern();
     const auto isLast = [&](int user, int of) {
-        return m_upperStart[of] == m_upperStart[of + 1] ? user == of : user == m_upperColumn[m_upperStart[of + 1] - 1];
+        const int end = at.upperStart[of + 1];
+        return at.upperStart[of] == end ? user == of : user == at.upperColumn[end - 1];
     };
     m_inversePlace[row] = places.take();
-    for (int k = m_rowStart[row]; k < m_rowStart[row + 1]; ++k)
-        if (m_column[k] >= first && isLast(row, m_column[k])) places.giveBack(m_inversePlace[m_column[k]]);
+    for (int k = at.lowerStart[row]; k < at.lowerStart[row + 1]; ++k) {
+        const int column = at.lowerColumn[k];
+        if (column >= first && isLast(row, column)) places.giveBack(m_inversePlace[column]);
+    }
     if (isLast(row, row)) places.giveBack(m_inversePlace[row]);
 }
 
 /// The same of its blocks. `lastUse`: row that needs each of them, < 0: none but its own.
 void CompactFactor::placeScaled(int row, int first, const std::vector<int>& lastUse, Places& places) {
-    const int begin = m_rowStart[row], end = m_rowStart[row + 1];
+    const int* const start = m_matrix.pattern().lowerStart;
+    const int begin = start[row], end = start[row + 1];
     for (int k = begin; k < end; ++k) m_scaledPlace[k] = places.take();
     for (int k = begin; k < end; ++k)
         if (lastUse[k] < 0) places.giveBack(m_scaledPlace[k]);
     for (int pair = m_pairStart[begin]; pair < m_pairStart[end]; ++pair) {
         int& q = m_pairs[2 * pair + 1];
-        const bool isOver = q >= m_rowStart[first] && lastUse[q] == row;
+        const bool isOver = q >= start[first] && lastUse[q] == row;
         q = m_scaledPlace[q];
         if (isOver) places.giveBack(q);
     }
@@ -274,12 +260,19 @@ void CompactFactor::factor(const FilteredMatrix& matrix, WorkerTeam* team) {
     constexpr double kMostShift = 1e3;  // as good as block Jacobi; keeps the loop finite on garbage
     m_shift *= 0.9;  // let it shrink again when the breakdown is over; a factor cares little for its size
     if (m_shift < 1e-3) m_shift = 0.0;
-    Factoring f{m_vertexOf.data(),       m_rowStart.data(),     m_column.data(),
-                m_source.data(),         m_pairStart.data(),    m_pairs.data(),
-                m_upperOf.data(),        m_inversePlace.data(), m_scaledPlace.data(),
-                matrix.diagonalBlocks(), matrix.lowerBlocks(),  m_inverse.data(),
-                m_scaled.data(),         m_root.data(),         m_rootTransposed.data(),
-                m_lower.data(),          m_upper.data(),        m_shift};
+    Factoring f{m_matrix.vertexOf().data(),
+                m_matrix.pattern(),
+                m_pairStart.data(),
+                m_pairs.data(),
+                m_inversePlace.data(),
+                m_scaledPlace.data(),
+                matrix.diagonalBlocks(),
+                matrix.lowerBlocks(),
+                m_inverse.data(),
+                m_scaled.data(),
+                m_root.data(),
+                m_lower.data(),
+                m_shift};
     const int strips = stripCount();
     const auto factorParts = [&](int first, int count) {
         std::atomic<bool> works = true;
@@ -298,13 +291,11 @@ void CompactFactor::factor(const FilteredMatrix& matrix, WorkerTeam* team) {
 
 void CompactFactor::factorDiagonally(const FilteredMatrix& matrix) {
     for (int row = 0; row < m_size; ++row) {
-        const double mean = std::max(matrix.diagonal(m_vertexOf[row]).trace() / 3.0, 1e-30);
-        for (auto* root : {&m_root, &m_rootTransposed})
-            Eigen::Map<Eigen::Matrix3f>(root->data() + 9 * row) =
-                Eigen::Matrix3f::Identity() * static_cast<float>(1.0 / std::sqrt(mean));
+        const double mean = std::max(matrix.diagonal(m_matrix.vertexOf()[row]).trace() / 3.0, 1e-30);
+        Eigen::Map<Eigen::Matrix3f>(m_root.data() + 9 * row) =
+            Eigen::Matrix3f::Identity() * static_cast<float>(1.0 / std::sqrt(mean));
     }
     std::fill(m_lower.begin(), m_lower.end(), 0.0f);
-    std::fill(m_upper.begin(), m_upper.end(), 0.0f);
     m_shift = 0.0;
 }
 
@@ -316,8 +307,7 @@ void CompactFactor::apply(const float* r, float* z) const {
 }
 
 CompactFactor::Solving CompactFactor::solving() const {
-    return {m_rowStart.data(), m_column.data(),         m_upperStart.data(), m_upperColumn.data(),
-            m_root.data(),     m_rootTransposed.data(), m_lower.data(),      m_upper.data()};
+    return {m_matrix.pattern(), m_root.data(), m_lower.data()};
 }
 
 void CompactFactor::forward(int strip, const float* r, float* z) const {

@@ -9,7 +9,7 @@ namespace jacket {
 /// IncompleteCholesky in the rows of a CompactMatrix, factored in double and applied in single precision.
 class CompactFactor {
   public:
-    /// Takes the pattern.
+    /// Of the pattern of `matrix`, which must outlive it.
     explicit CompactFactor(const CompactMatrix& matrix);
     /// `matrix`: of the block matrix that the pattern came from.
     void factor(const FilteredMatrix& matrix, WorkerTeam* team = nullptr);
@@ -25,8 +25,8 @@ class CompactFactor {
 
     /// All that solving reads, as plain memory for the kernels. Blocks are nine floats by columns.
     struct Solving {
-        const int *rowStart, *column, *upperStart, *upperColumn;
-        const float *root, *rootTransposed, *lower, *upper;
+        CompactMatrix::Pattern pattern;
+        const float *root, *lower;
     };
 
   private:
@@ -42,29 +42,24 @@ class CompactFactor {
         std::vector<int> m_free;
         int m_count = 0;
     };
-    void takePattern(const CompactMatrix& matrix);
     void findPairs();
     void placeValues();
     void placeInverse(int row, int first, Places& places);
     void placeScaled(int row, int first, const std::vector<int>& lastUse, Places& places);
     Solving solving() const;
     void factorDiagonally(const FilteredMatrix& matrix);
+    const CompactMatrix& m_matrix;  ///< for its pattern
     int m_size;
     std::vector<int> m_partStart;  ///< see CompactMatrix::partStarts
-    std::vector<int> m_vertexOf;   ///< of each row
-    /// Strictly lower blocks by rows: column, and where they come from (see CompactMatrix::source).
-    std::vector<int> m_rowStart, m_column, m_source;
     /// Block k loses L_p D L_q^T for its pairs: p counted within the row, and where L_q D is kept.
     std::vector<int> m_pairStart, m_pairs;
-    /// Strictly upper blocks of L^T by rows, and the place there of each lower block.
-    std::vector<int> m_upperStart, m_upperColumn, m_upperOf;
     /// D^-1 of rows and L D of blocks are kept until the last row that needs them, and others take their places.
     std::vector<int> m_inversePlace, m_scaledPlace;
     std::vector<double> m_inverse, m_scaled;
-    int m_mostInRow = 0;                          ///< lower blocks
-    std::vector<double> m_rows;                   ///< scratch: one row of L for each strip
-    std::vector<float> m_root, m_rootTransposed;  ///< W and W^T, W^T W = D^-1
-    std::vector<float> m_lower, m_upper;          ///< L, L^T
+    int m_mostInRow = 0;         ///< lower blocks
+    std::vector<double> m_rows;  ///< scratch: one row of L for each strip
+    std::vector<float> m_root;   ///< W, W^T W = D^-1
+    std::vector<float> m_lower;  ///< L
     double m_shift = 0.0;
 };
 

@@ -114,13 +114,21 @@ void sortByLevel(const Neighbours& neighbours, Division& division) {
                      [&](int a, int b) { return std::pair(part[a], level[a]) < std::pair(part[b], level[b]); });
 }
 
+/// `source`: see CompactMatrix::Pattern.
+Mat3 blockFrom(const BlockMatrix& matrix, int source) {
+    return source >= 0 ? matrix.lower()[source] : Mat3(matrix.lower()[~source].transpose());
+}
+
 JACKET_KERNEL void multiplyKernel(const CompactMatrix::View& view, int begin, int end, const float* x, float* y) {
     const CompactMatrix::View a = view;  // nobody writes there
+    const CompactMatrix::Pattern& p = a.pattern;
     for (int i = begin; i < end; ++i) {
         const Float4 xi = load4(x + 4 * i);
         Float4 sum = times(a.rowSums + 9 * i, xi), even{}, odd{};  // two sums: shorter chains of additions
-        for (int k = a.rowStart[i]; k < a.rowStart[i + 1]; ++k)
-            sum += times(a.blocks + 9 * k, load4(x + 4 * a.column[k]) - xi);
+        for (int k = p.lowerStart[i]; k < p.lowerStart[i + 1]; ++k)
+            sum += times(a.blocks + 9 * k, load4(x + 4 * p.lowerColumn[k]) - xi);
+        for (int k = p.upperStart[i]; k < p.upperStart[i + 1]; ++k)
+            sum += timesTransposed(a.blocks + 9 * p.upperBlock[k], load4(x + 4 * p.upperColumn[k]) - xi);
         int k = a.besideStart[i];
         const int besideEnd = a.besideStart[i + 1];
         for (; k + 1 < besideEnd; k += 2) {
@@ -144,24 +152,34 @@ CompactMatrix::CompactMatrix(const BlockMatrix& matrix) : m_size(matrix.size()) 
     m_vertexOf = std::move(division.order);
     m_rowOf.resize(m_size);
     for (int row = 0; row < m_size; ++row) m_rowOf[m_vertexOf[row]] = row;
-    m_rowStart.assign(1, 0);
-    m_column.reserve(2 * matrix.lower().size());
-    m_source.reserve(2 * matrix.lower().size());
-    for (int row = 0; row < m_size; ++row) {
-        const int i = m_vertexOf[row];
-        const auto first = static_cast<std::ptrdiff_t>(m_column.size());
-        for (const int j : neighbours[i]) m_column.push_back(m_rowOf[j]);
-        std::sort(m_column.begin() + first, m_column.end());
-        for (auto k = static_cast<std::size_t>(first); k < m_column.size(); ++k) {
-            const int j = m_vertexOf[m_column[k]];
-            m_source.push_back(i > j ? matrix.slot(i, j) : ~matrix.slot(j, i));
-        }
-        m_rowStart.push_back(static_cast<int>(m_column.size()));
-    }
-    m_blocks.assign(9 * m_column.size() + 3, 0.0f);
+    takePattern(matrix, neighbours);
+    m_blocks.assign(9 * m_lowerColumn.size() + 3, 0.0f);
     m_rowSums.assign(9 * m_size + 3, 0.0f);
     m_besideStart.assign(m_size + 1, 0);
     m_besideSums.assign(m_size, 0.0);
+}
+
+void CompactMatrix::takePattern(const BlockMatrix& matrix, const Neighbours& neighbours) {
+    const std::size_t count = matrix.lower().size();
+    for (auto* perBlock : {&m_lowerColumn, &m_source, &m_upperColumn}) perBlock->reserve(count);
+    m_upperBlock.resize(count);
+    for (auto* perRow : {&m_lowerStart, &m_upperStart}) perRow->assign(m_size + 1, 0);
+    std::vector<int> columns;
+    for (int row = 0; row < m_size; ++row) {
+        columns.clear();
+        for (const int j : neighbours[m_vertexOf[row]]) columns.push_back(m_rowOf[j]);
+        std::sort(columns.begin(), columns.end());
+        for (const int column : columns) (column < row ? m_lowerColumn : m_upperColumn).push_back(column);
+        m_lowerStart[row + 1] = static_cast<int>(m_lowerColumn.size());
+        m_upperStart[row + 1] = static_cast<int>(m_upperColumn.size());
+    }
+    std::vector<int> next(m_upperStart.begin(), m_upperStart.end() - 1);
+    for (int row = 0; row < m_size; ++row)
+        for (int k = m_lowerStart[row]; k < m_lowerStart[row + 1]; ++k) {
+            const int i = m_vertexOf[row], j = m_vertexOf[m_lowerColumn[k]];
+            m_source.push_back(i > j ? matrix.slot(i, j) : ~matrix.slot(j, i));
+            m_upperBlock[next[m_lowerColumn[k]]++] = k;
+        }
 }
 
 void CompactMatrix::takeBeside(const ConstantHessian* scalars) {
@@ -205,12 +223,13 @@ void CompactMatrix::takeRows(const BlockMatrix& matrix, int begin, int end) {
     for (int row = begin; row < end; ++row) {
         Mat3 sum = matrix.diagonal()[m_vertexOf[row]];
         sum.diagonal().array() += matrix.besideFactor() * m_besideSums[row];
-        for (int k = m_rowStart[row]; k < m_rowStart[row + 1]; ++k) {
-            const int source = m_source[k];
-            const Mat3 block = source >= 0 ? matrix.lower()[source] : Mat3(matrix.lower()[~source].transpose());
+        for (int k = m_lowerStart[row]; k < m_lowerStart[row + 1]; ++k) {
+            const Mat3 block = blockFrom(matrix, m_source[k]);
             sum += block;
             Eigen::Map<Eigen::Matrix3f>(m_blocks.data() + 9 * k) = block.cast<float>();
         }
+        for (int k = m_upperStart[row]; k < m_upperStart[row + 1]; ++k)
+            sum += blockFrom(matrix, ~m_source[m_upperBlock[k]]);
         Eigen::Map<Eigen::Matrix3f>(m_rowSums.data() + 9 * row) = sum.cast<float>();
     }
 }

@@ -31,47 +31,54 @@ class CompactMatrix {
     int stripCount() const { return (static_cast<int>(m_partStart.size())) / 2; }
     /// First row of each strip, then of each separator, then the number of rows.
     const std::vector<int>& partStarts() const { return m_partStart; }
-    /// Blocks of a row: all columns but the row's own, in rising order.
-    int rowBegin(int row) const { return m_rowStart[row]; }
-    int rowEnd(int row) const { return m_rowStart[row + 1]; }
-    int column(int k) const { return m_column[k]; }
-    /// Where block k comes from: a slot of the block matrix, or ~slot of the transposed one.
-    int source(int k) const { return m_source[k]; }
+    /// Calls visit(column) for the blocks of a row but its own, by rising columns.
+    void forColumns(int row, const auto& visit) const {
+        for (int k = m_lowerStart[row]; k < m_lowerStart[row + 1]; ++k) visit(m_lowerColumn[k]);
+        for (int k = m_upperStart[row]; k < m_upperStart[row + 1]; ++k) visit(m_upperColumn[k]);
+    }
+    int lowerCount() const { return static_cast<int>(m_lowerColumn.size()); }  ///< blocks below the diagonal
     /// Scalars beside the blocks, without their common factor: all columns in rising order, none the row's own.
     int besideBegin(int row) const { return m_besideStart[row]; }
     int besideEnd(int row) const { return m_besideStart[row + 1]; }
     int besideColumn(int k) const { return m_besideColumn[k]; }
     double besideFactor() const { return m_besideFactor; }
 
-    /// All of it as plain memory, for kernels. Blocks are nine floats by columns.
+    /// Where the blocks are, as plain memory for kernels: those below the diagonal by rows, and by columns above it, of
+    /// which `upperBlock` is the one below the diagonal that each of them is the transpose of.
+    struct Pattern {
+        const int *lowerStart, *lowerColumn, *upperStart, *upperColumn, *upperBlock;
+        const int* source;  ///< of each block below: its slot in the block matrix, or ~slot of its transpose
+    };
+    Pattern pattern() const {
+        return {m_lowerStart.data(),  m_lowerColumn.data(), m_upperStart.data(),
+                m_upperColumn.data(), m_upperBlock.data(),  m_source.data()};
+    }
+
+    /// All of it for kernels. Blocks are nine floats by columns.
     struct View {
         int size;
-        const int *rowStart, *column, *besideStart, *besideColumn;
+        Pattern pattern;
+        const int *besideStart, *besideColumn;
         const float *blocks, *rowSums, *beside;  ///< rowSums: sum_j A_ij
         float besideFactor;
     };
     View view() const {
-        return {m_size,
-                m_rowStart.data(),
-                m_column.data(),
-                m_besideStart.data(),
-                m_besideColumn.data(),
-                m_blocks.data(),
-                m_rowSums.data(),
-                m_beside.data(),
-                static_cast<float>(m_besideFactor)};
+        return {m_size,          pattern(),        m_besideStart.data(), m_besideColumn.data(),
+                m_blocks.data(), m_rowSums.data(), m_beside.data(),      static_cast<float>(m_besideFactor)};
     }
 
     /// y = A x; four floats a row, the last of them 0. They must not overlap.
     void multiply(const float* x, float* y, WorkerTeam* team = nullptr) const;
 
   private:
+    void takePattern(const BlockMatrix& matrix, const std::vector<std::vector<int>>& neighbours);
     void takeBeside(const ConstantHessian* scalars);
     void takeRows(const BlockMatrix& matrix, int begin, int end);
     int m_size;
     std::vector<int> m_partStart;
-    std::vector<int> m_rowOf, m_vertexOf, m_rowStart, m_column, m_source;
-    std::vector<float> m_blocks, m_rowSums;
+    std::vector<int> m_rowOf, m_vertexOf;
+    std::vector<int> m_lowerStart, m_lowerColumn, m_upperStart, m_upperColumn, m_upperBlock, m_source;
+    std::vector<float> m_blocks, m_rowSums;  ///< blocks: below the diagonal
     const ConstantHessian* m_besideSource = nullptr;
     std::size_t m_besideCount = 0;  ///< scalars when it was taken
     std::vector<int> m_besideStart, m_besideColumn;

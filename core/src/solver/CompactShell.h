@@ -16,6 +16,7 @@ struct CompactShell {
     std::unique_ptr<CoarseSpace> coarse;  ///< of shells that are large enough
 
     explicit CompactShell(const BlockMatrix& blocks) : product(blocks), matrix(blocks), factor(matrix) {}
+    CompactShell(const CompactShell&) = delete;  // the factor refers to the matrix
 
     /// z = P^-1 r, four floats a row. The coarse problem, which has no parts, is solved beside the factor's.
     void precondition(const float* r, float* z, WorkerTeam* team) const {
