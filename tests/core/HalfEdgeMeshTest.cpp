@@ -38,7 +38,7 @@ TEST(HalfEdgeMesh, TwoTrianglesMakeOneHinge) {
     EXPECT_EQ(mesh.twin(0), 3);
     EXPECT_EQ(mesh.triangleAcross(0, 0), 1);
     EXPECT_EQ(mesh.triangleAcross(0, 1), -1);
-    EXPECT_EQ(std::vector<int>(mesh.neighbours(0).begin(), mesh.neighbours(0).end()), (std::vector{1, 2, 3}));
+    EXPECT_EQ(mesh.neighbours(0), (std::vector{1, 2, 3}));
     EXPECT_EQ(mesh.neighbours(3).size(), 2u);
     EXPECT_EQ(mesh.trianglesAround(1).size(), 2u);
     EXPECT_EQ(mesh.trianglesAround(2).size(), 1u);

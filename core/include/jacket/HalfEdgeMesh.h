@@ -30,21 +30,23 @@ class HalfEdgeMesh {
     int triangleCount() const { return static_cast<int>(m_triangles.cols()); }
     const Indices<3>& triangles() const { return m_triangles; }
     std::span<const Edge> edges() const { return m_edges; }
-    std::span<const Hinge> hinges() const { return m_hinges; }
+    std::vector<Hinge> hinges() const;  ///< in the order of their edges; listed anew by each call
     int edgeOf(int halfEdge) const { return m_edgeOf[halfEdge]; }
-    int twin(int halfEdge) const { return m_twins[halfEdge]; }  ///< -1 on the border
-    int triangleAcross(int triangle, int corner) const;         ///< over half-edge (triangle, corner); -1 on the border
-    std::span<const int> trianglesAround(int vertex) const;     ///< in no particular order
-    std::span<const int> neighbours(int vertex) const;          ///< one-ring vertices, ascending
+    int twin(int halfEdge) const {  ///< -1 on the border
+        const Edge& edge = m_edges[m_edgeOf[halfEdge]];
+        return edge.halfEdge == halfEdge ? edge.twin : edge.halfEdge;
+    }
+    int triangleAcross(int triangle, int corner) const;      ///< over half-edge (triangle, corner); -1 on the border
+    std::span<const int> trianglesAround(int vertex) const;  ///< in no particular order
+    std::vector<int> neighbours(int vertex) const;           ///< one-ring vertices, ascending; listed anew
     bool isBorderVertex(int vertex) const { return m_borderVertex[vertex] != 0; }
 
   private:
     int m_vertexCount;
     Indices<3> m_triangles;
-    std::vector<int> m_twins, m_edgeOf;
+    std::vector<int> m_edgeOf;
     std::vector<Edge> m_edges;
-    std::vector<Hinge> m_hinges;
-    std::vector<int> m_triangleStart, m_triangleList, m_neighbourStart, m_neighbourList;
+    std::vector<int> m_triangleStart, m_triangleList;
     std::vector<char> m_borderVertex;
 };
 

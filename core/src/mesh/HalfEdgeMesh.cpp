@@ -42,7 +42,7 @@ HalfEdgeMesh::HalfEdgeMesh(const Indices<3>& triangles, int vertexCount)
     const int halfEdgeCount = 3 * triangleCount();
 
     // Twins: the two half-edges of an edge, which must run in opposite directions.
-    m_twins.assign(halfEdgeCount, -1);
+    std::vector<int> twins(halfEdgeCount, -1);
     const EdgeTable table(m_triangles, vertexCount, [](int) { return true; });
     table.forEachEdge([&](auto first, auto last) {
         if (last - first == 1) return;
@@ -55,52 +55,50 @@ HalfEdgeMesh::HalfEdgeMesh(const Indices<3>& triangles, int vertexCount)
             throw std::invalid_argument(edge + ": triangles " + std::to_string(g / 3) + " and " +
                                         std::to_string(h / 3) +
                                         " both run along it in this direction; neighbours must be oriented alike");
-        m_twins[g] = h;
-        m_twins[h] = g;
+        twins[g] = h;
+        twins[h] = g;
     });
 
     // Edges in the order of their first half-edges, so that neighbours in memory are neighbours on the surface.
     m_edgeOf.assign(halfEdgeCount, -1);
     m_borderVertex.assign(vertexCount, 0);
     m_edges.reserve(halfEdgeCount / 2 + 1);
-    m_hinges.reserve(halfEdgeCount / 2);
-    const auto opposite = [this](int h) { return m_triangles((h + 2) % 3, h / 3); };
     for (int h = 0; h < halfEdgeCount; ++h) {
         if (m_edgeOf[h] >= 0) continue;
-        const int edge = static_cast<int>(m_edges.size()), v0 = table.from(h), v1 = table.to(h), other = m_twins[h];
+        const int edge = static_cast<int>(m_edges.size()), v0 = table.from(h), v1 = table.to(h), other = twins[h];
         m_edges.push_back({.v0 = v0, .v1 = v1, .halfEdge = h, .twin = other});
         m_edgeOf[h] = edge;
         if (other >= 0) {
             m_edgeOf[other] = edge;
-            m_hinges.push_back({.vertices = {v0, v1, opposite(h), opposite(other)}, .edge = edge});
         } else {
             m_borderVertex[v0] = m_borderVertex[v1] = 1;
         }
     }
+    m_edges.shrink_to_fit();
 
-    // Triangles and neighbours of each vertex, as lists one behind the other.
+    // Triangles of each vertex, as lists one behind the other.
     m_triangleStart.assign(vertexCount + 1, 0);
     for (int h = 0; h < halfEdgeCount; ++h) ++m_triangleStart[table.from(h) + 1];
     countsToStarts(m_triangleStart);
     m_triangleList.resize(halfEdgeCount);
     std::vector<int> fill(m_triangleStart.begin(), m_triangleStart.end() - 1);
     for (int h = 0; h < halfEdgeCount; ++h) m_triangleList[fill[table.from(h)]++] = h / 3;
+}
 
-    m_neighbourStart.assign(vertexCount + 1, 0);
-    for (const Edge& e : m_edges) ++m_neighbourStart[e.v0 + 1], ++m_neighbourStart[e.v1 + 1];
-    countsToStarts(m_neighbourStart);
-    m_neighbourList.resize(2 * m_edges.size());
-    fill.assign(m_neighbourStart.begin(), m_neighbourStart.end() - 1);
-    for (const Edge& e : m_edges) {
-        m_neighbourList[fill[e.v0]++] = e.v1;
-        m_neighbourList[fill[e.v1]++] = e.v0;
+std::vector<HalfEdgeMesh::Hinge> HalfEdgeMesh::hinges() const {
+    std::vector<Hinge> result;
+    const auto opposite = [this](int h) { return m_triangles((h + 2) % 3, h / 3); };
+    for (std::size_t i = 0; i < m_edges.size(); ++i) {
+        const Edge& e = m_edges[i];
+        if (e.isBorder()) continue;
+        result.push_back(
+            {.vertices = {e.v0, e.v1, opposite(e.halfEdge), opposite(e.twin)}, .edge = static_cast<int>(i)});
     }
-    for (int v = 0; v < vertexCount; ++v)
-        std::sort(m_neighbourList.begin() + m_neighbourStart[v], m_neighbourList.begin() + m_neighbourStart[v + 1]);
+    return result;
 }
 
 int HalfEdgeMesh::triangleAcross(int triangle, int corner) const {
-    const int other = m_twins[3 * triangle + corner];
+    const int other = twin(3 * triangle + corner);
     return other < 0 ? -1 : other / 3;
 }
 
@@ -108,8 +106,14 @@ std::span<const int> HalfEdgeMesh::trianglesAround(int vertex) const {
     return {m_triangleList.data() + m_triangleStart[vertex], m_triangleList.data() + m_triangleStart[vertex + 1]};
 }
 
-std::span<const int> HalfEdgeMesh::neighbours(int vertex) const {
-    return {m_neighbourList.data() + m_neighbourStart[vertex], m_neighbourList.data() + m_neighbourStart[vertex + 1]};
+std::vector<int> HalfEdgeMesh::neighbours(int vertex) const {
+    std::vector<int> result;
+    for (const int t : trianglesAround(vertex))
+        for (int k = 0; k < 3; ++k)
+            if (m_triangles(k, t) != vertex) result.push_back(m_triangles(k, t));
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
 }
 
 }  // namespace jacket
