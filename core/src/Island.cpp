@@ -115,9 +115,10 @@ struct IslandSolver::Impl {
     Points lastChange;               ///< dv of the last step
     Points expected;                 ///< velocities if that goes on
     CoupledVector u;
-    Points guess, reached;       ///< velocities: what a solve starts from, and what the last one led to
-    Points newtonFrom, calmest;  ///< where the last Newton step was linearised, and where one that gained least was
-    Points& rigid = newtonFrom;  ///< velocities of shells that do not deform: asked for once Newton steps are over
+    const Points* guess = nullptr;  ///< velocities that a solve starts from: `expected`, or `v`
+    Points newtonFrom, calmest;     ///< where the last Newton step was linearised, and where one that gained least was
+    /// Velocities of shells that do not deform, and what the last solve led to: asked for once Newton steps are over.
+    Points &rigid = newtonFrom, &reached = calmest;
     std::vector<CoupledSystem::ShellPart> parts;
     BodyVectors freeTwist, guessTwist;
     BodyVectors twistChange;  ///< of the bodies' twists, by the shells
@@ -707,7 +708,7 @@ PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, 
         reference = std::max(rho, floorOfReference(input, isCoarse ? 1.0 : 0.1));
     }
     if (report.solves > 0 || !isCoarse || start.cols() < kLarge) {
-        system.start(guess, guessTwist, u);
+        system.start(*guess, guessTwist, u);
         rho = pcg.begin(system, preconditioner, u);
     }
     double target2 = tolerance * tolerance * reference;
@@ -735,7 +736,8 @@ void IslandSolver::Impl::solveRound(const IslandInput& input, bool roughly, int&
         const bool isDone = solveOnce(input, roughly, most, report).converged || most == maxIterations;
         lap.addTo(times.solve);
         if (isDone) return;
-        system.velocities(u, guess);
+        system.velocities(u, v);
+        guess = &v;
         guessTwist = u.w;
     }
     LapTimer lap(input);
@@ -749,7 +751,7 @@ void IslandSolver::Impl::solveRound(const IslandInput& input, bool roughly, int&
 /// Until the contacts agree with the motion that they lead to. Where that is asked only once, and they changed in the
 /// last step, a rough solve tells enough, if it is by far cheaper than one to the tolerance.
 void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& report) {
-    guess = report.solves == 0 ? expected : v;
+    guess = report.solves == 0 ? &expected : &v;
     guessTwist = report.solves == 0 ? freeTwist : u.w;
     u.resize(static_cast<int>(start.cols()), system.bodyCount());
     int freshIterations = -1;  // of the first solve with the present factor
@@ -777,7 +779,7 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         if (!changed && !lifted && !roughly) break;
         roughly = false;
         if (changed) ++round;
-        guess = v;
+        guess = &v;
         guessTwist = u.w;
     }
     lastRounds = round + 1;

@@ -60,7 +60,6 @@ Shell::Shell(const TriangleMesh& mesh, std::vector<ShellMaterial> materials, std
     m_force.setZero(3, n);
     m_y.setZero(3, n);
     m_pinned.assign(n, 0);
-    m_pinTarget.assign(n, Vec3::Zero());
     m_design = std::make_unique<ShellDesign>();
     m_design->materials = {std::move(materials), std::move(ofTriangle)};
     setMasses();
@@ -69,12 +68,11 @@ Shell::Shell(const TriangleMesh& mesh, std::vector<ShellMaterial> materials, std
 
 void Shell::setMasses() {
     m_mass.setZero(vertexCount());
-    m_restArea.resize(m_mesh->triangleCount());
     for (int t = 0; t < m_mesh->triangleCount(); ++t) {
         const auto corners = m_mesh->triangles().col(t);
-        m_restArea[t] = triangleArea(m_rest.col(corners[0]), m_rest.col(corners[1]), m_rest.col(corners[2]));
+        const double area = triangleArea(m_rest.col(corners[0]), m_rest.col(corners[1]), m_rest.col(corners[2]));
         const double density = m_design->materials.at(t).areaDensity();
-        for (int a = 0; a < 3; ++a) m_mass[corners[a]] += density * m_restArea[t] / 3.0;
+        for (int a = 0; a < 3; ++a) m_mass[corners[a]] += density * area / 3.0;
     }
 }
 
@@ -101,8 +99,7 @@ void Shell::setPositions(const Points& x) {
     m_x = x;
     m_y.setZero();
     m_lastH = 0.0;
-    for (int i = 0; i < vertexCount(); ++i)
-        if (m_pinned[i]) m_pinTarget[i] = m_x.col(i);
+    for (auto& [vertex, target] : m_pinTarget) target = m_x.col(vertex);
 }
 
 void Shell::setVelocities(const Points& v) {
@@ -162,6 +159,7 @@ void Shell::unpin(int vertex) {
     requireVertex(vertex, "Shell::unpin");
     m_pinCount -= m_pinned[vertex] || isGuided(vertex) ? 1 : 0;
     m_pinned[vertex] = 0;
+    m_pinTarget.erase(vertex);
     if (!m_freedom.empty()) {
         m_freedom[vertex].setIdentity();
         m_guided[vertex] = 0;

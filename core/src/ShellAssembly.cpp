@@ -43,11 +43,17 @@ ShellAssembly::ShellAssembly(const Shell& shell, const ShellDesign& design)
     for (const auto& energy : m_energies) energy->collectPairs(pairs);
     m_system.matrix.setPattern(shell.mesh().vertexCount(), std::move(pairs));
     for (const auto& energy : m_energies) energy->bind(m_system.matrix);
+    for (const auto& energy : m_energies)
+        if (energy->constantHessian()) m_constant = energy->constantHessian();
+}
+
+/// Of all triangles, when wind or pressure first asks for them.
+const std::vector<std::array<int, 3>>& ShellAssembly::triangleSlots(const Shell& shell) {
+    if (!m_triangleSlots.empty()) return m_triangleSlots;
     m_triangleSlots.reserve(shell.mesh().triangleCount());
     for (int t = 0; t < shell.mesh().triangleCount(); ++t)
         m_triangleSlots.push_back(stencilSlots<3>(m_system.matrix, cornersOf(shell, t)));
-    for (const auto& energy : m_energies)
-        if (energy->constantHessian()) m_constant = energy->constantHessian();
+    return m_triangleSlots;
 }
 
 void ShellAssembly::addEnergies(const Points& x, HessianKind kind) {
@@ -79,6 +85,7 @@ const StepSystem& ShellAssembly::assembleStatic(const Shell& shell, const Vec3& 
 /// How pressure follows the surface: force p/6 (x1 - x0) x (x2 - x0) on each corner. Symmetric summed over a closed
 /// surface; of an open one the symmetric part.
 void ShellAssembly::addPressureStiffness(const Shell& shell, double pressure) {
+    const auto& slots = triangleSlots(shell);
     for (int t = 0; t < shell.mesh().triangleCount(); ++t) {
         const auto corners = cornersOf(shell, t);
         const Stencil<3> x = gather(shell.positions(), corners);
@@ -89,7 +96,7 @@ void ShellAssembly::addPressureStiffness(const Shell& shell, double pressure) {
         for (int a = 0; a < 3; ++a) {
             m_system.addDiagonal(corners[a], 0.5 * (byCorner(a) + byCorner(a).transpose()));
             for (int b = 0; b < a; ++b, ++pair)
-                m_system.addPair(m_triangleSlots[t][pair], 0.5 * (byCorner(b) + byCorner(a).transpose()));
+                m_system.addPair(slots[t][pair], 0.5 * (byCorner(b) + byCorner(a).transpose()));
         }
     }
 }
@@ -98,9 +105,10 @@ const StepSystem& ShellAssembly::assemble(const Shell& shell, double h, const Ve
                                           const Eigen::Ref<const Points>& start, const Eigen::Ref<const Points>& y,
                                           const Eigen::Ref<const Points>* ahead, WorkerTeam* team) {
     m_system.setTeam(team);
-    if (ahead) m_end = shell.positions() + h * *ahead + y;
-    m_system.begin(h, shell.material().stiffnessDamping, m_constant);       // A = (h^2 + h beta) K_constant, b = 0
-    addEnergies(ahead ? m_end : shell.positions(), HessianKind::Positive);  // A += (h^2 + h beta) K, b += h f
+    Points& end = m_system.scratch();  // where `ahead` leads
+    if (ahead) end = shell.positions() + h * *ahead + y;
+    m_system.begin(h, shell.material().stiffnessDamping, m_constant);     // A = (h^2 + h beta) K_constant, b = 0
+    addEnergies(ahead ? end : shell.positions(), HessianKind::Positive);  // A += (h^2 + h beta) K, b += h f
     if (ahead)
         m_system.addAlteration(*ahead, -h);  // b += h^2 K v', linearised at the end
     else if (!y.isZero(0.0))
@@ -124,11 +132,12 @@ void ShellAssembly::addLoads(const Shell& shell, const Vec3& gravity, double loa
 }
 
 void ShellAssembly::addWind(const Shell& shell, const Wind& wind) {
+    const auto& slots = triangleSlots(shell);
     for (int t = 0; t < shell.mesh().triangleCount(); ++t) {
         const auto corners = cornersOf(shell, t);
         const WindOnTriangle w =
             windOnTriangle(wind, gather(shell.positions(), corners), gather(shell.velocities(), corners));
-        m_system.addDrag(corners, m_triangleSlots[t], w.force, w.drag, shell.velocities());
+        m_system.addDrag(corners, slots[t], w.force, w.drag, shell.velocities());
     }
 }
 

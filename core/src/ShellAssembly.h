@@ -36,14 +36,14 @@ class ShellAssembly {
 
   private:
     void addPressureStiffness(const Shell& shell, double pressure);
+    const std::vector<std::array<int, 3>>& triangleSlots(const Shell& shell);
     void addEnergies(const Points& x, HessianKind kind);
     void addLoads(const Shell& shell, const Vec3& gravity, double load);
     void addWind(const Shell& shell, const Wind& wind);
     std::vector<std::unique_ptr<Energy>> m_energies;  ///< membrane, then bending
     StepSystem m_system;
-    const ConstantHessian* m_constant = nullptr;  ///< of one of them, at most
-    Points m_end;                                 ///< where `ahead` leads
-    std::vector<std::array<int, 3>> m_triangleSlots;
+    const ConstantHessian* m_constant = nullptr;      ///< of one of them, at most
+    std::vector<std::array<int, 3>> m_triangleSlots;  ///< as of stencilSlots; empty until something asks for them
 };
 
 }  // namespace jacket

@@ -74,9 +74,8 @@ void StepParts::begin() {
     }
     for (std::size_t k = 0; k < m_start.size(); ++k) {
         Shell& shell = *m_whole.shells[k];
-        for (int i = 0; i < shell.vertexCount(); ++i)
-            if (shell.isPinned(i))
-                shell.m_pinTarget[i] = shell.m_x.col(i) + share * (m_start[k].pinTargets[i] - shell.m_x.col(i));
+        for (auto& [vertex, target] : shell.m_pinTarget)
+            target = shell.m_x.col(vertex) + share * (m_start[k].pinTargets.at(vertex) - shell.m_x.col(vertex));
     }
 }
 

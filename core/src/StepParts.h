@@ -34,7 +34,7 @@ class StepParts {
     static constexpr int kTicks = 16;  ///< that the shortest parts would be
     struct Start {
         Points x, v;
-        std::vector<Vec3> pinTargets;
+        std::map<int, Vec3> pinTargets;
     };
     void begin();
     void moveBodies();

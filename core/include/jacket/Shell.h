@@ -1,4 +1,5 @@
 #pragma once
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -113,7 +114,7 @@ class Shell {
     void movePin(int vertex, const Vec3& target);
     void unpin(int vertex);
     bool isPinned(int vertex) const { return m_pinned[vertex] != 0; }
-    const Vec3& pinTarget(int vertex) const { return m_pinTarget[vertex]; }
+    const Vec3& pinTarget(int vertex) const { return m_pinTarget.at(vertex); }  ///< of a pinned one
     int pinCount() const { return m_pinCount; }
 
     /// Holds a vertex in one direction: it slides freely across it. Up to three directions add up; unpin frees it.
@@ -186,12 +187,12 @@ class Shell {
     double m_stride = 1.0;    ///< part of the step that velocities count for in it (BDF2: gamma)
     Points m_lastX, m_lastV;  ///< a step ago, for BDF2
     double m_lastH = 0.0;     ///< length of that step; 0: there is none [s]
-    Eigen::VectorXd m_mass, m_restArea;
+    Eigen::VectorXd m_mass;
     Eigen::VectorXd m_restLength;  ///< of the mesh's edges [m]
     double m_meanEdge = 0.0;       ///< [m]
     std::vector<char> m_pinned;
-    std::vector<Vec3> m_pinTarget;
-    std::vector<Mat3> m_freedom;  ///< of guided vertices; empty while there are none
+    std::map<int, Vec3> m_pinTarget;  ///< of pinned vertices
+    std::vector<Mat3> m_freedom;      ///< of guided vertices; empty while there are none
     std::vector<char> m_guided;
     double m_plasticWork = 0.0;
     Dent m_dent;

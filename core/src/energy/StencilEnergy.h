@@ -24,6 +24,9 @@ class StencilEnergy final : public Energy {
         std::vector<Vertices> stencils;
         std::vector<double> areas;
         std::vector<int> triangles;  ///< the first at each stencil's site
+        bool canYield() const {
+            return std::isfinite(Model::kSite == StencilSite::Triangle ? yield.tension : yield.curvature);
+        }
     };
 
     StencilEnergy(std::vector<Group> groups, const RestShape& rest) : m_groups(std::move(groups)) {
@@ -32,10 +35,13 @@ class StencilEnergy final : public Energy {
         m_ranges.resize(m_groups.size());
         m_accumulated.resize(m_groups.size());
         for (std::size_t g = 0; g < m_groups.size(); ++g) {
-            const Group& group = m_groups[g];
+            Group& group = m_groups[g];
             m_rest[g].reserve(group.stencils.size());
             for (std::size_t i = 0; i < group.stencils.size(); ++i)
                 m_rest[g].push_back(group.model.rest(atRest(rest, group.stencils[i]), group.areas[i]));
+            if (group.canYield()) continue;
+            group.areas = std::vector<double>();  // gives its memory back, which {} does not
+            group.triangles = std::vector<int>();
         }
     }
 
@@ -161,8 +167,7 @@ class StencilEnergy final : public Energy {
 
     void flowOf(std::size_t g, const Points& x, PlasticFlow& result) {
         const Group& group = m_groups[g];
-        const bool isTriangle = Model::kSite == StencilSite::Triangle;
-        if (!std::isfinite(isTriangle ? group.yield.tension : group.yield.curvature)) return;
+        if (!group.canYield()) return;
         m_accumulated[g].resize(group.stencils.size(), 0.0);
         for (std::size_t i = 0; i < group.stencils.size(); ++i) {
             typename Model::Rest moved = m_rest[g][i];

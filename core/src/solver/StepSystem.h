@@ -72,10 +72,15 @@ class StepSystem {
         addMatrix<N>(vertices, slots, damping, m_h);
     }
 
+    /// Memory for three numbers a vertex, of whoever asked last.
+    Points& scratch() {
+        m_scratch.resize(3, matrix.size());
+        return m_scratch;
+    }
+
     /// The force -K (scale y) of an alteration. Only after every energy and before anything else has been added.
     void addAlteration(const Eigen::Ref<const Points>& y, double scale = 1.0) {
-        m_scratch.resize(3, matrix.size());
-        matrix.multiply(y.data(), m_scratch.data());  // (h^2 + h beta) K y
+        matrix.multiply(y.data(), scratch().data());  // (h^2 + h beta) K y
         rhs -= (scale * m_h / m_stiffnessFactor) * m_scratch;
     }
 
