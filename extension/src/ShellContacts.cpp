@@ -68,6 +68,7 @@ struct ShellContacts::Query {
     const Points& x;
     Frame frame;  ///< of the obstacle
     double vertexReach, faceReach;
+    bool isConvex;  ///< the obstacle is one piece
     std::vector<Contact>& contacts;
     double thickness() const { return shellBody.contactThickness(); }
     bool wantsFaces() const { return faceReach > -std::numeric_limits<double>::infinity(); }
@@ -107,6 +108,7 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
                     moved(m_start[body], pose.twists[body], pose.time),
                     std::min(vertexReach, obstacle.body.inner),  // beyond that its nearest point says nothing
                     faceReach,
+                    obstacle.shape->pieces.size() == 1 && obstacle.shape->concave.empty(),
                     contacts};
         for (const auto& piece : obstacle.shape->pieces) {
             findVertices(query, *piece);
@@ -209,7 +211,13 @@ void ShellContacts::addFace(Query& query, int triangle, const TrianglePoint& tou
     for (int a = 0; a < 3; ++a)
         if (touch.weights[a] <= 1e-9)
             feature = Feature::edge(mesh.edgeOf(3 * triangle + (a + 1) % 3), mesh.vertexCount());
-    add(query, feature, touch.surface, {corners[0], corners[1], corners[2]}, touch.weights);
+    const Contact contact =
+        makeContact(query, feature, touch.surface, {corners[0], corners[1], corners[2]}, touch.weights);
+    const auto [known, fresh] = m_byFeature.try_emplace(feature, query.contacts.size());
+    if (fresh)
+        append(query.contacts, contact);
+    else if (contact.gap < query.contacts[known->second].gap)
+        query.contacts[known->second] = contact;
 }
 
 /// Of all that a vertex can touch, what is not covered by something nearer.
@@ -223,6 +231,14 @@ void ShellContacts::addVertices(Query& query) {
     if (!std::is_sorted(candidates.begin(), candidates.end(), isBefore))  // one piece: it is
         std::stable_sort(candidates.begin(), candidates.end(), isBefore);
     makeRoom(query.contacts, candidates.size());
+    const auto add = [&](int vertex, int side, const SurfacePoint& surface) {
+        append(query.contacts, makeContact(query, Feature::vertex(vertex) + side * featureCount, surface,
+                                           {vertex, vertex, vertex}, Vec3::UnitX()));
+    };
+    if (query.isConvex) {
+        for (const auto& candidate : candidates) add(candidate.vertex, 0, candidate.surface);
+        return;
+    }
     std::vector<SurfacePoint>& kept = m_memory.kept;
     for (std::size_t first = 0, next; first < candidates.size(); first = next) {
         const int vertex = candidates[first].vertex;
@@ -233,9 +249,7 @@ void ShellContacts::addVertices(Query& query) {
                 kept.push_back(surface);
         }
         findSides(m_sides[query.pair][vertex], kept);
-        for (std::size_t k = 0; k < kept.size(); ++k)
-            add(query, Feature::vertex(vertex) + m_memory.sides[k] * featureCount, kept[k], {vertex, vertex, vertex},
-                Vec3::UnitX());
+        for (std::size_t k = 0; k < kept.size(); ++k) add(vertex, m_memory.sides[k], kept[k]);
     }
 }
 
@@ -287,8 +301,8 @@ void ShellContacts::setMaterial(Contact& contact) {
     contact.restitution = material.restitution;
 }
 
-void ShellContacts::add(Query& query, int feature, const SurfacePoint& surface, const std::array<int, 3>& vertices,
-                        const Vec3& weights) {
+Contact ShellContacts::makeContact(const Query& query, int feature, const SurfacePoint& surface,
+                                   const std::array<int, 3>& vertices, const Vec3& weights) {
     Contact contact;
     contact.shell = query.shell;
     contact.feature = feature;
@@ -298,11 +312,7 @@ void ShellContacts::add(Query& query, int feature, const SurfacePoint& surface, 
     contact.normal = query.frame.linear() * surface.normal;
     contact.point = query.frame * surface.point;
     contact.gap = surface.distance - query.thickness();
-    const auto [known, fresh] = m_byFeature.try_emplace(feature, query.contacts.size());
-    if (fresh)
-        append(query.contacts, contact);
-    else if (contact.gap < query.contacts[known->second].gap)
-        query.contacts[known->second] = contact;
+    return contact;
 }
 
 }  // namespace jacket::bullet

@@ -34,8 +34,8 @@ class ShellContacts final : public ContactDetector {
     struct Sweep;
     void sweepPiece(const Sweep& sweep, const SweepTarget& target, std::vector<Contact>& contacts);
     const TrianglePatch& wholeOf(const ConcavePiece& piece, double radius);
-    void add(Query& query, int feature, const SurfacePoint& surface, const std::array<int, 3>& vertices,
-             const Vec3& weights);
+    static Contact makeContact(const Query& query, int feature, const SurfacePoint& surface,
+                               const std::array<int, 3>& vertices, const Vec3& weights);
     void findVertices(Query& query, const ConvexPiece& piece);
     void findFaces(Query& query, const ConvexPiece& piece);
     void findConcave(Query& query, const ConcavePiece& piece, std::unique_ptr<TrianglePatch>& patch);
@@ -55,9 +55,9 @@ class ShellContacts final : public ContactDetector {
         double friction, restitution;
     };
     std::pmr::map<std::tuple<int, int, int>, Material> m_materials;  ///< of shell, body and feature
-    std::pmr::map<int, std::size_t> m_byFeature;                     ///< of the present pair: index in the result
+    std::pmr::map<int, std::size_t> m_byFeature;  ///< of the present pair: index in the result; vertices where swept
     /// Of each pair, for vertices that came near: the sides of a valley that it has met in this step, in the body's
-    /// frame. Their index is part of a contact's id.
+    /// frame. Their index is part of a contact's id. A convex body has one side, which is not listed.
     std::pmr::vector<std::pmr::map<int, Sides>> m_sides;
     std::pmr::vector<std::vector<std::unique_ptr<TrianglePatch>>> m_patches;  ///< of each pair, of each concave piece
     std::map<const ConcavePiece*, TrianglePatch> m_whole;                     ///< of the shapes of fast bodies
