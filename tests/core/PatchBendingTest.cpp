@@ -81,11 +81,15 @@ struct Sheet {
                 dense.block<3, 3>(3 * m.column(k), 3 * i) += m.lower()[k].transpose();
             }
         }
-        const ConstantHessian& q = *energy.constantHessian();
-        for (const auto& scalars : {q.inside(), q.beside()})
+        const auto add = [&](const auto& scalars) {
             for (int i = 0; i < n; ++i)
                 for (int k = scalars.start[i]; k < scalars.start[i + 1]; ++k)
                     dense.block<3, 3>(3 * i, 3 * scalars.column[k]).diagonal().array() += scalars.value[k];
+        };
+        energy.constantHessian()->visit([&](const auto& inside, const auto& beside) {
+            add(inside);
+            add(beside);
+        });
         return dense;
     }
 };

@@ -28,18 +28,22 @@ double norm(const Vec3& k) {  // of a symmetric tensor given as uu, vv, uv
 }
 
 /// A matrix of scalars, and positions in fours.
+template <class Column>
 struct ConstantRows {
-    ConstantHessian::Rows inside, beside;
+    ConstantHessian::Rows<Column> inside, beside;
     const double* x;
     int count;
 };
 
-ConstantRows rowsTimes(const Eigen::Matrix<double, 4, Eigen::Dynamic>& x, const ConstantHessian& scalars) {
-    return {scalars.inside(), scalars.beside(), x.data(), static_cast<int>(x.cols())};
+/// visit(rows)
+decltype(auto) visitRows(const Eigen::Matrix<double, 4, Eigen::Dynamic>& x, const ConstantHessian& scalars,
+                         const auto& visit) {
+    return scalars.visit([&](const auto& inside, const auto& beside) {
+        return visit(ConstantRows{inside, beside, x.data(), static_cast<int>(x.cols())});
+    });
 }
 
-using Scalars = ConstantHessian::Rows;
-
+template <class Scalars>
 JACKET_INLINE void addDifference(const Scalars& scalars, int k, const double* x, const double* xi, double (&sum)[4]) {
     const double* const xj = x + 4 * scalars.column[k];
     for (int c = 0; c < 4; ++c) sum[c] += scalars.value[k] * (xj[c] - xi[c]);
@@ -47,8 +51,9 @@ JACKET_INLINE void addDifference(const Scalars& scalars, int k, const double* x,
 
 /// Row i of the matrix times the positions, by rising columns. Its sum is zero, so differences to x_i do: they lose no
 /// digits far from the origin.
-JACKET_INLINE void multiplyRow(const ConstantRows& rows, int i, double (&sum)[4]) {
-    const Scalars &inside = rows.inside, &beside = rows.beside;
+template <class Column>
+JACKET_INLINE void multiplyRow(const ConstantRows<Column>& rows, int i, double (&sum)[4]) {
+    const ConstantHessian::Rows<Column>&inside = rows.inside, &beside = rows.beside;
     const double *const x = rows.x, *const xi = x + 4 * i;
     for (double& s : sum) s = 0.0;
     int b = beside.start[i];
@@ -61,7 +66,9 @@ JACKET_INLINE void multiplyRow(const ConstantRows& rows, int i, double (&sum)[4]
 }
 
 /// to += factor K x for rows begin to end - 1, by three numbers a vertex.
-JACKET_KERNEL void addConstantGradient(const ConstantRows& rows, int begin, int end, double factor, double* to) {
+template <class Column>
+JACKET_KERNEL void addConstantGradient(const ConstantRows<Column>& rows, int begin, int end, double factor,
+                                       double* to) {
     for (int i = begin; i < end; ++i) {
         double sum[4];
         multiplyRow(rows, i, sum);
@@ -73,6 +80,7 @@ JACKET_INLINE void loadPosition(const double* x, int i, Double4& to) {
     std::memcpy(&to, x + 4 * static_cast<std::size_t>(i), sizeof(to));
 }
 
+template <class Scalars>
 JACKET_INLINE void subtractSquare(const Scalars& scalars, int k, const double* x, const Double4& xi, Double4& sum) {
     Double4 xj;
     loadPosition(x, scalars.column[k], xj);
@@ -80,8 +88,9 @@ JACKET_INLINE void subtractSquare(const Scalars& scalars, int k, const double* x
 }
 
 /// x . K x = -sum_{i<j} K_ij |x_j - x_i|^2, for the same reason.
-JACKET_KERNEL double constantProduct(const ConstantRows& rows) {
-    const Scalars &inside = rows.inside, &beside = rows.beside;
+template <class Column>
+JACKET_KERNEL double constantProduct(const ConstantRows<Column>& rows) {
+    const ConstantHessian::Rows<Column>&inside = rows.inside, &beside = rows.beside;
     const double* const x = rows.x;
     Double4 sum{};
     for (int i = 0; i < rows.count; ++i) {
@@ -338,7 +347,7 @@ double PatchEnergy::flatValue(const Points& x) const {
     mean = first + mean / static_cast<double>(x.cols());
     const Mat3 map = moments * m_inverseMoments;
     for (int i = 0; i < x.cols(); ++i) m_padded.col(i).head<3>() = x.col(i) - mean - map * m_flatRest.col(i);
-    return 0.5 * constantProduct(rowsTimes(m_padded, m_constant));
+    return 0.5 * visitRows(m_padded, m_constant, [](const auto& rows) { return constantProduct(rows); });
 }
 
 /// Of a mirrored patch, whose share the constant Hessian does not have.
@@ -359,8 +368,8 @@ void PatchEnergy::pad(const Points& x) const {
 
 void PatchEnergy::addGradient(const Points& x, Points& gradient) const {
     pad(x);
-    const ConstantRows rows = rowsTimes(m_padded, m_constant);
-    addConstantGradient(rows, 0, rows.count, 1.0, gradient.data());
+    visitRows(m_padded, m_constant,
+              [&](const auto& rows) { addConstantGradient(rows, 0, rows.count, 1.0, gradient.data()); });
     const auto add = [&](int vertex, const Vec3& g) { gradient.col(vertex) += g; };
     for (const Element& e : m_elements) {
         if (e.mirrored >= 0)
@@ -373,9 +382,10 @@ void PatchEnergy::addGradient(const Points& x, Points& gradient) const {
 void PatchEnergy::addTo(StepSystem& system, const Points& x, HessianKind kind) const {
     pad(x);
     const TermSink sink = system.sink();
-    const ConstantRows rows = rowsTimes(m_padded, m_constant);
-    runRanges(system.team(), static_cast<int>(x.cols()), kVerticesAtATime,
-              [&](int begin, int end) { addConstantGradient(rows, begin, end, sink.gradientFactor, sink.rhs); });
+    visitRows(m_padded, m_constant, [&](const auto& rows) {
+        runRanges(system.team(), rows.count, kVerticesAtATime,
+                  [&](int begin, int end) { addConstantGradient(rows, begin, end, sink.gradientFactor, sink.rhs); });
+    });
     for (const Element& e : m_elements) {
         if (e.mirrored >= 0) addMirrored(e, system, x);
         if (e.isCurved()) addNormalTerms(e, system, x, kind);

@@ -10,17 +10,19 @@ namespace jacket {
 namespace {
 
 /// Scalars by rows, and what those beside the blocks are multiplied with, in fours.
+template <class Column>
 struct ScalarRows {
-    ConstantHessian::Rows scalars;
+    ConstantHessian::Rows<Column> scalars;
     const double* x;
     double factor;
     int count;
 };
 
 /// y += factor K x, three numbers a row of y.
-JACKET_KERNEL void addScalarRows(const ScalarRows& beside, double* y) {
-    const ScalarRows rows = beside;  // nobody writes there
-    const ConstantHessian::Rows& scalars = rows.scalars;
+template <class Column>
+JACKET_KERNEL void addScalarRows(const ScalarRows<Column>& beside, double* y) {
+    const ScalarRows<Column> rows = beside;  // nobody writes there
+    const ConstantHessian::Rows<Column>& scalars = rows.scalars;
     for (int i = 0; i < rows.count; ++i) {
         Double4 even{}, odd{};  // two sums: shorter chains of additions
         int k = scalars.start[i];
@@ -129,7 +131,9 @@ void BlockMatrix::multiply(const double* x, double* y) const {
 void BlockMatrix::addBeside(const double* x, double* y) const {
     m_padded.resize(4 * static_cast<std::size_t>(size()));
     for (int i = 0; i < size(); ++i) std::copy_n(x + 3 * i, 3, m_padded.data() + 4 * i);
-    addScalarRows({m_beside->beside(), m_padded.data(), m_besideFactor, size()}, y);
+    m_beside->visit([&](const auto&, const auto& scalars) {
+        addScalarRows(ScalarRows{scalars, m_padded.data(), m_besideFactor, size()}, y);
+    });
 }
 
 }  // namespace jacket

@@ -68,10 +68,11 @@ class BlockMatrix {
 /// Calls `visit(i, j, scalar)`, i > j, for what stands beside the blocks; besideFactor() is not in it.
 void forBeside(const BlockMatrix& matrix, const auto& visit) {
     if (!matrix.beside()) return;
-    const auto scalars = matrix.beside()->beside();
-    for (int i = 0; i < matrix.size(); ++i)
-        for (int k = scalars.start[i]; k < scalars.start[i + 1] && scalars.column[k] < i; ++k)
-            visit(i, scalars.column[k], scalars.value[k]);
+    matrix.beside()->visit([&](const auto&, const auto& scalars) {
+        for (int i = 0; i < matrix.size(); ++i)
+            for (int k = scalars.start[i]; k < scalars.start[i + 1] && scalars.column[k] < i; ++k)
+                visit(i, scalars.column[k], scalars.value[k]);
+    });
 }
 
 }  // namespace jacket

@@ -7,15 +7,17 @@ namespace {
 
 constexpr int kBlockRowsAtATime = 512;
 
+template <class Column>
 struct Blocks {
     const int *lowerStart, *lowerColumn, *upperStart, *upperRow, *upperSlot;
-    const double *diagonal, *lower;  ///< nine numbers a block, by columns
-    ConstantHessian::Rows scalars;   ///< beside; null: none
+    const double *diagonal, *lower;         ///< nine numbers a block, by columns
+    ConstantHessian::Rows<Column> scalars;  ///< beside; null: none
     double besideFactor;
 };
 
-JACKET_KERNEL void multiplyKernel(const Blocks& blocks, int begin, int end, const double* x, double* y) {
-    const Blocks b = blocks;  // nobody writes there
+template <class Column>
+JACKET_KERNEL void multiplyKernel(const Blocks<Column>& blocks, int begin, int end, const double* x, double* y) {
+    const Blocks<Column> b = blocks;  // nobody writes there
     for (int i = begin; i < end; ++i) {
         double sum[3], beside[3] = {};
         const double *d = b.diagonal + 9 * i, *xi = x + 3 * i;
@@ -51,17 +53,21 @@ BlockProduct::BlockProduct(const BlockMatrix& matrix)
 }
 
 void BlockProduct::multiply(const BlockMatrix& matrix, const double* x, double* y, WorkerTeam* team) const {
-    const ConstantHessian* beside = matrix.beside();
-    const Blocks blocks{matrix.rowStarts().data(),
-                        matrix.columns().data(),
-                        m_upperStart.data(),
-                        m_upperRow.data(),
-                        m_upperSlot.data(),
-                        matrix.diagonal().data()->data(),
-                        matrix.lower().empty() ? nullptr : matrix.lower().data()->data(),
-                        beside ? beside->beside() : ConstantHessian::Rows{},
-                        matrix.besideFactor()};
-    runRanges(team, matrix.size(), kBlockRowsAtATime, [&](int begin, int end) { multiplyKernel(blocks, begin, end, x, y); });
+    const auto multiplyWith = [&](const auto& scalars) {
+        const Blocks blocks{matrix.rowStarts().data(),
+                            matrix.columns().data(),
+                            m_upperStart.data(),
+                            m_upperRow.data(),
+                            m_upperSlot.data(),
+                            matrix.diagonal().data()->data(),
+                            matrix.lower().empty() ? nullptr : matrix.lower().data()->data(),
+                            scalars,
+                            matrix.besideFactor()};
+        runRanges(team, matrix.size(), kBlockRowsAtATime,
+                  [&](int begin, int end) { multiplyKernel(blocks, begin, end, x, y); });
+    };
+    if (!matrix.beside()) return multiplyWith(ConstantHessian::Rows<int>{});
+    matrix.beside()->visit([&](const auto&, const auto& scalars) { multiplyWith(scalars); });
 }
 
 void BlockProduct::addColumn(const BlockMatrix& matrix, int vertex, const Vec3& change, double* y) const {
@@ -72,9 +78,10 @@ void BlockProduct::addColumn(const BlockMatrix& matrix, int vertex, const Vec3& 
     for (int k = m_upperStart[vertex]; k < m_upperStart[vertex + 1]; ++k)
         add(m_upperRow[k], matrix.lower()[m_upperSlot[k]] * change);
     if (!matrix.beside()) return;
-    const auto scalars = matrix.beside()->beside();
-    for (int k = scalars.start[vertex]; k < scalars.start[vertex + 1]; ++k)  // symmetric: a row is a column
-        add(scalars.column[k], matrix.besideFactor() * scalars.value[k] * change);
+    matrix.beside()->visit([&](const auto&, const auto& scalars) {
+        for (int k = scalars.start[vertex]; k < scalars.start[vertex + 1]; ++k)  // symmetric: a row is a column
+            add(scalars.column[k], matrix.besideFactor() * scalars.value[k] * change);
+    });
 }
 
 }  // namespace jacket

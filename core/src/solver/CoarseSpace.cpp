@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "Kernel.h"
@@ -86,7 +87,7 @@ std::vector<std::vector<int>> patchNeighbours(const CompactMatrix& matrix, const
     };
     for (int row = 0; row < matrix.size(); ++row) {
         matrix.forColumns(row, [&](int column) { join(row, column); });
-        for (int k = matrix.besideBegin(row); k < matrix.besideEnd(row); ++k) join(row, matrix.besideColumn(k));
+        for (int k = matrix.besideBegin(row); k < matrix.besideEnd(row); ++k) join(row, matrix.besideColumns()[k]);
     }
     return neighbours;
 }
@@ -130,7 +131,8 @@ JACKET_INLINE void addModes(Float4 r, const Float4* t, double* sums) {
 struct Galerkin {
     CompactMatrix::Pattern pattern;
     const int *patchStart, *members, *target, *patchOf;
-    const int *besideStart, *besideColumn, *scalarStart, *scalars;
+    const int *besideStart, *scalarStart;
+    const std::uint16_t* scalars;
     const float *blocks, *rowSums, *beside, *arms;
     const char *isHeld, *isNearHeld;  ///< see CoarseSpace
     double *sums, *besideSums;
@@ -199,38 +201,45 @@ JACKET_INLINE void addMomentAt(float s, Float4 ri, Float4 rj, float* moments) {
 
 /// Pairs with a held vertex are left out: near it the shell seems stiffer than it is, which harms less than taking the
 /// trouble.
-JACKET_KERNEL void addScalars(const Galerkin& g, int patch) {
+template <class Column>
+JACKET_KERNEL void addScalars(const Galerkin& g, const Column* besideColumn, int patch) {
     Float4 own[4] = {};
     double ownSum = 0.0;
-    const auto unlessHeld = [&](int k) { return g.isHeld[g.besideColumn[k]] ? 0.0f : g.beside[k]; };
+    const auto unlessHeld = [&](int k) { return g.isHeld[besideColumn[k]] ? 0.0f : g.beside[k]; };
     for (int m = g.patchStart[patch]; m < g.patchStart[patch + 1]; ++m) {
-        const int i = g.members[m], *start = g.scalarStart + 3 * i;
+        const int i = g.members[m];
         if (m + kAhead < g.patchStart[patch + 1]) {
-            const int next = g.members[m + kAhead], *scalars = g.scalarStart + 3 * next;
+            const int next = g.members[m + kAhead];
             prefetch(g.beside + g.besideStart[next], g.beside + g.besideStart[next + 1]);
-            prefetch(g.besideColumn + g.besideStart[next], g.besideColumn + g.besideStart[next + 1]);
-            prefetch(g.scalars + scalars[0], g.scalars + scalars[3]);
+            prefetch(besideColumn + g.besideStart[next], besideColumn + g.besideStart[next + 1]);
+            prefetch(g.scalars + g.scalarStart[next], g.scalars + g.scalarStart[next + 1]);
         }
         if (g.isHeld[i]) continue;
         const Float4 ri = load4(g.arms + 4 * i);
         float crossSum = 0.0f;  // of scalars to other patches
-        for (int at = start[0]; at < start[1]; ++at) {
-            const int k = g.scalars[at];
-            const Float4 arm = load4(g.arms + 4 * g.besideColumn[k]) - ri;
+        const int first = g.besideStart[i];
+        const std::uint16_t* at = g.scalars + g.scalarStart[i];
+        const std::uint16_t* const ownEnd = at + 2 + at[0];
+        int places = at[1];
+        for (at += 2; at < ownEnd; ++at) {
+            const int k = first + *at;
+            const Float4 arm = load4(g.arms + 4 * besideColumn[k]) - ri;
             addMoment(-unlessHeld(k), arm, arm, own);
         }
-        for (int at = start[1]; at < start[2];) {
-            const int target = g.scalars[at + 1];
+        for (; places > 0; --places) {
+            const int target = at[0] | at[1] << 16;
+            const std::uint16_t* const end = at + 3 + at[2];
             Float4 sum{};  // of s (r_j, 1)
-            for (; at < start[2] && g.scalars[at + 1] == target; at += 2) {
-                const int k = g.scalars[at];
-                sum += unlessHeld(k) * load4(g.arms + 4 * g.besideColumn[k]);
+            for (at += 3; at < end; ++at) {
+                const int k = first + *at;
+                sum += unlessHeld(k) * load4(g.arms + 4 * besideColumn[k]);
             }
             crossSum -= sum[3];
             addMomentAt(1.0f, ri, sum, g.moments + kMoments * target);
             g.besideSums[target] += sum[3];
         }
-        for (int at = start[2]; at < start[3]; ++at) crossSum -= unlessHeld(g.scalars[at]);
+        for (const std::uint16_t* const end = g.scalars + g.scalarStart[i + 1]; at < end; ++at)
+            crossSum -= unlessHeld(first + *at);
         ownSum += crossSum;
         addMoment(crossSum, ri, ri, own);
     }
@@ -282,36 +291,53 @@ CoarseSpace::CoarseSpace(const CompactMatrix& matrix)
 }
 
 void CoarseSpace::findTargets(const CompactMatrix& matrix) {
+    m_placeOf.assign(m_factor.blockCount(), -1);
+    for (int p = 0; p < patchCount(); ++p) placeOf(p, p);
     const CompactMatrix::Pattern pattern = matrix.pattern();
     m_target.reserve(matrix.lowerCount());
     m_scalarStart.assign(1, 0);
-    std::vector<std::pair<int, int>> foreign;  // of another patch' block, and place
-    std::vector<int> mirrored;
     for (int row = 0; row < matrix.size(); ++row) {
-        const int p = m_patchOf[row];
-        for (int k = pattern.lowerStart[row]; k < pattern.lowerStart[row + 1]; ++k) {
-            const int q = m_patchOf[pattern.lowerColumn[k]];
-            m_target.push_back(m_factor.index(std::max(p, q), std::min(p, q)));
-        }
-        foreign.clear();
-        mirrored.clear();
-        for (int k = matrix.besideBegin(row); k < matrix.besideEnd(row); ++k) {
-            const int column = matrix.besideColumn(k), target = m_factor.index(p, m_patchOf[column]);
-            if (target < 0)
-                mirrored.push_back(k);
-            else if (target != p)
-                foreign.push_back({target, k});
-            else if (column < row)
-                m_scalars.push_back(k);
-        }
-        m_scalarStart.push_back(static_cast<int>(m_scalars.size()));
-        std::sort(foreign.begin(), foreign.end());
-        for (const auto& [target, k] : foreign) m_scalars.insert(m_scalars.end(), {k, target});
-        m_scalarStart.push_back(static_cast<int>(m_scalars.size()));
-        m_scalars.insert(m_scalars.end(), mirrored.begin(), mirrored.end());
+        for (int k = pattern.lowerStart[row]; k < pattern.lowerStart[row + 1]; ++k)
+            m_target.push_back(placeOf(m_patchOf[row], m_patchOf[pattern.lowerColumn[k]]));
+        listScalars(matrix, row);
         m_scalarStart.push_back(static_cast<int>(m_scalars.size()));
     }
     m_scalars.shrink_to_fit();
+}
+
+/// Of what two patches have with each other.
+int CoarseSpace::placeOf(int p, int q) {
+    const int block = m_factor.index(std::max(p, q), std::min(p, q));
+    if (m_placeOf[block] < 0) {
+        m_placeOf[block] = static_cast<int>(m_blockOf.size());
+        m_blockOf.push_back(block);
+    }
+    return m_placeOf[block];
+}
+
+void CoarseSpace::listScalars(const CompactMatrix& matrix, int row) {
+    const int p = m_patchOf[row], begin = matrix.besideBegin(row);
+    const auto number = [](int value) { return static_cast<std::uint16_t>(value); };
+    std::vector<std::uint16_t> own, mirrored;
+    std::map<std::pair<int, int>, std::vector<std::uint16_t>> beyond;  // by the factor's block, and place
+    for (int k = begin; k < matrix.besideEnd(row); ++k) {
+        const int column = matrix.besideColumns()[k], q = m_patchOf[column];
+        if (q > p)
+            mirrored.push_back(number(k - begin));
+        else if (q < p)
+            beyond[{m_factor.index(p, q), placeOf(p, q)}].push_back(number(k - begin));
+        else if (column < row)
+            own.push_back(number(k - begin));
+    }
+    const auto append = [&](const auto& list) { m_scalars.insert(m_scalars.end(), list.begin(), list.end()); };
+    append(std::array{number(static_cast<int>(own.size())), number(static_cast<int>(beyond.size()))});
+    append(own);
+    for (const auto& [at, scalars] : beyond) {
+        const int place = at.second;
+        append(std::array{number(place & 0xffff), number(place >> 16), number(static_cast<int>(scalars.size()))});
+        append(scalars);
+    }
+    append(mirrored);
 }
 
 void CoarseSpace::placeArms(const CompactMatrix& matrix, const Points& positions) {
@@ -338,7 +364,7 @@ void CoarseSpace::placeArms(const CompactMatrix& matrix, const Points& positions
 /// The matrices are added up by the kernels in forms of their own; here they become the factor's blocks.
 void CoarseSpace::collect(double besideFactor, int begin, int end) {
     for (int b = begin; b < end; ++b) {
-        Eigen::Map<Mat6> block(m_factor.block(b));
+        Eigen::Map<Mat6> block(m_factor.block(m_blockOf[b]));
         const double* sums = m_sums.data() + kSums * b;
         for (int column = 0; column < 6; ++column)
             for (int c = 0; c < 3; ++c) {
@@ -385,21 +411,22 @@ void CoarseSpace::build(const CompactMatrix& matrix, const Points& positions, co
         ++m_heldCount;
         matrix.forColumns(row, [&](int column) { m_isNearHeld[column] = 1; });
     }
-    m_sums.assign(kSums * m_factor.blockCount(), 0.0);
-    m_moments.assign(kMoments * m_factor.blockCount(), 0.0f);
-    m_besideSums.assign(m_factor.blockCount(), 0.0);
+    m_sums.assign(kSums * m_blockOf.size(), 0.0);
+    m_moments.assign(kMoments * m_blockOf.size(), 0.0f);
+    m_besideSums.assign(m_blockOf.size(), 0.0);
     const auto view = matrix.view();
-    const Galerkin g{view.pattern,     m_patchStart.data(), m_members.data(),     m_target.data(),  m_patchOf.data(),
-                     view.besideStart, view.besideColumn,   m_scalarStart.data(), m_scalars.data(), view.blocks,
-                     view.rowSums,     view.beside,         m_arms.data(),        m_isHeld.data(),  m_isNearHeld.data(),
-                     m_sums.data(),    m_besideSums.data(), m_moments.data()};
+    const Galerkin g{view.pattern,        m_patchStart.data(),  m_members.data(), m_target.data(),     m_patchOf.data(),
+                     view.besideStart,    m_scalarStart.data(), m_scalars.data(), view.blocks,         view.rowSums,
+                     view.beside,         m_arms.data(),        m_isHeld.data(),  m_isNearHeld.data(), m_sums.data(),
+                     m_besideSums.data(), m_moments.data()};
     runParts(team, patchCount(), [&](int patch) {
         addBlocks(g, patch);
         for (int m = m_patchStart[patch]; m < m_patchStart[patch + 1]; ++m)
             if (m_isNearHeld[m_members[m]]) addHeldRow(g, m_members[m], free);
-        addScalars(g, patch);
+        matrix.besideColumns().visit([&](const auto* columns) { addScalars(g, columns, patch); });
     });
-    runRanges(team, m_factor.blockCount(), kBlocksAtATime,
+    m_factor.setZero();
+    runRanges(team, static_cast<int>(m_blockOf.size()), kBlocksAtATime,
               [&](int begin, int end) { collect(matrix.besideFactor(), begin, end); });
     addTies(free, ties);
     m_factor.factor();

@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -37,16 +38,25 @@ class CoarseSpace {
 
   private:
     void findTargets(const CompactMatrix& matrix);
+    void listScalars(const CompactMatrix& matrix, int row);
+    int placeOf(int p, int q);
     void placeArms(const CompactMatrix& matrix, const Points& positions);
     void addTies(const std::vector<const Mat3*>& free, std::span<const Tie> ties);
     void collect(double besideFactor, int begin, int end);
     std::vector<int> m_patchOf;                ///< of each row; patches are numbered as they are eliminated
     std::vector<int> m_patchStart, m_members;  ///< rows of each patch
     BlockFactor m_factor;
-    std::vector<int> m_target;  ///< factor's block of each block below the matrix's diagonal, or of its transpose
-    /// Of each row three groups of places of scalars: in the patch and below the diagonal; beyond it, each with the
-    /// factor's block; those whose mirror images are such.
-    std::vector<int> m_scalarStart, m_scalars;
+    /// The factor's blocks that P^T A P has, the others being fill: first each patch' own. What is added up for them
+    /// stands in this order.
+    std::vector<int> m_blockOf;
+    std::vector<int> m_placeOf;  ///< of each of the factor's blocks in it; -1: fill
+    std::vector<int> m_target;   ///< the same of each block below the matrix's diagonal, or of its transpose
+    /// Of each row three groups of scalars, by their order in the row: in the patch and below the diagonal; beyond it,
+    /// by the places that they belong to; those whose mirror images do so. Before them stands how many the first are,
+    /// and how many places follow; before those of a place stands that, in two halves, and how many they are. Of 16
+    /// bits: a row of more scalars would have four billion beside it.
+    std::vector<int> m_scalarStart;
+    std::vector<std::uint16_t> m_scalars;
     int m_heldCount = 0;
     std::vector<char> m_isHeld;        ///< rows with a projector
     std::vector<char> m_isNearHeld;    ///< and those beside them

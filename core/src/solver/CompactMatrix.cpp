@@ -119,7 +119,9 @@ Mat3 blockFrom(const BlockMatrix& matrix, int source) {
     return source >= 0 ? matrix.lower()[source] : Mat3(matrix.lower()[~source].transpose());
 }
 
-JACKET_KERNEL void multiplyKernel(const CompactMatrix::View& view, int begin, int end, const float* x, float* y) {
+template <class Column>
+JACKET_KERNEL void multiplyKernel(const CompactMatrix::View& view, const Column* besideColumn, int begin, int end,
+                                  const float* x, float* y) {
     const CompactMatrix::View a = view;  // nobody writes there
     const CompactMatrix::Pattern& p = a.pattern;
     for (int i = begin; i < end; ++i) {
@@ -132,10 +134,10 @@ JACKET_KERNEL void multiplyKernel(const CompactMatrix::View& view, int begin, in
         int k = a.besideStart[i];
         const int besideEnd = a.besideStart[i + 1];
         for (; k + 1 < besideEnd; k += 2) {
-            even += a.beside[k] * (load4(x + 4 * a.besideColumn[k]) - xi);
-            odd += a.beside[k + 1] * (load4(x + 4 * a.besideColumn[k + 1]) - xi);
+            even += a.beside[k] * (load4(x + 4 * besideColumn[k]) - xi);
+            odd += a.beside[k + 1] * (load4(x + 4 * besideColumn[k + 1]) - xi);
         }
-        if (k < besideEnd) even += a.beside[k] * (load4(x + 4 * a.besideColumn[k]) - xi);
+        if (k < besideEnd) even += a.beside[k] * (load4(x + 4 * besideColumn[k]) - xi);
         store4(y + 4 * i, xyz0(sum) + a.besideFactor * (even + odd));
     }
 }
@@ -187,27 +189,27 @@ void CompactMatrix::takeBeside(const ConstantHessian* scalars) {
     m_besideCount = scalars ? scalars->besideCount() : 0;
     m_besideStart.assign(m_size + 1, 0);
     m_besideSums.assign(m_size, 0.0);
-    m_besideColumn.clear();
+    m_besideColumn.begin(m_size, m_besideCount);
     m_beside.clear();
     if (!scalars) return;
-    m_besideColumn.reserve(m_besideCount);
     m_beside.reserve(m_besideCount);
-    const auto from = scalars->beside();
     std::vector<std::pair<int, float>> entries;
-    for (int row = 0; row < m_size; ++row) {
-        entries.clear();
-        const int vertex = m_vertexOf[row];
-        for (int k = from.start[vertex]; k < from.start[vertex + 1]; ++k) {
-            m_besideSums[row] += from.value[k];
-            entries.emplace_back(m_rowOf[from.column[k]], static_cast<float>(from.value[k]));
+    scalars->visit([&](const auto&, const auto& from) {
+        for (int row = 0; row < m_size; ++row) {
+            entries.clear();
+            const int vertex = m_vertexOf[row];
+            for (int k = from.start[vertex]; k < from.start[vertex + 1]; ++k) {
+                m_besideSums[row] += from.value[k];
+                entries.emplace_back(m_rowOf[from.column[k]], static_cast<float>(from.value[k]));
+            }
+            std::sort(entries.begin(), entries.end());
+            for (const auto& [column, value] : entries) {
+                m_besideColumn.push_back(column);
+                m_beside.push_back(value);
+            }
+            m_besideStart[row + 1] = static_cast<int>(m_beside.size());
         }
-        std::sort(entries.begin(), entries.end());
-        for (const auto& [column, value] : entries) {
-            m_besideColumn.push_back(column);
-            m_beside.push_back(value);
-        }
-        m_besideStart[row + 1] = static_cast<int>(m_beside.size());
-    }
+    });
 }
 
 bool CompactMatrix::setValues(const BlockMatrix& matrix, WorkerTeam* team) {
@@ -235,7 +237,10 @@ void CompactMatrix::takeRows(const BlockMatrix& matrix, int begin, int end) {
 }
 
 void CompactMatrix::multiply(const float* x, float* y, WorkerTeam* team) const {
-    runRanges(team, m_size, kRowsAtATime, [&](int begin, int end) { multiplyKernel(view(), begin, end, x, y); });
+    m_besideColumn.visit([&](const auto* columns) {
+        runRanges(team, m_size, kRowsAtATime,
+                  [&](int begin, int end) { multiplyKernel(view(), columns, begin, end, x, y); });
+    });
 }
 
 }  // namespace jacket

@@ -40,7 +40,7 @@ class CompactMatrix {
     /// Scalars beside the blocks, without their common factor: all columns in rising order, none the row's own.
     int besideBegin(int row) const { return m_besideStart[row]; }
     int besideEnd(int row) const { return m_besideStart[row + 1]; }
-    int besideColumn(int k) const { return m_besideColumn[k]; }
+    const Columns& besideColumns() const { return m_besideColumn; }
     double besideFactor() const { return m_besideFactor; }
 
     /// Where the blocks are, as plain memory for kernels: those below the diagonal by rows, and by columns above it, of
@@ -58,13 +58,18 @@ class CompactMatrix {
     struct View {
         int size;
         Pattern pattern;
-        const int *besideStart, *besideColumn;
+        const int* besideStart;
         const float *blocks, *rowSums, *beside;  ///< rowSums: sum_j A_ij
         float besideFactor;
     };
     View view() const {
-        return {m_size,          pattern(),        m_besideStart.data(), m_besideColumn.data(),
-                m_blocks.data(), m_rowSums.data(), m_beside.data(),      static_cast<float>(m_besideFactor)};
+        return {m_size,
+                pattern(),
+                m_besideStart.data(),
+                m_blocks.data(),
+                m_rowSums.data(),
+                m_beside.data(),
+                static_cast<float>(m_besideFactor)};
     }
 
     /// y = A x; four floats a row, the last of them 0. They must not overlap.
@@ -81,7 +86,8 @@ class CompactMatrix {
     std::vector<float> m_blocks, m_rowSums;  ///< blocks: below the diagonal
     const ConstantHessian* m_besideSource = nullptr;
     std::size_t m_besideCount = 0;  ///< scalars when it was taken
-    std::vector<int> m_besideStart, m_besideColumn;
+    std::vector<int> m_besideStart;
+    Columns m_besideColumn;
     std::vector<float> m_beside;
     std::vector<double> m_besideSums;  ///< of whole rows
     double m_besideFactor = 0.0;

@@ -1,47 +1,50 @@
 #include "solver/ConstantHessian.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "solver/BlockMatrix.h"
 
 namespace jacket {
+
+void ConstantHessian::append(int column, double value) {
+    m_listed.column.push_back(column);
+    m_listed.value.push_back(value);
+}
+
+void ConstantHessian::Part::begin(int size, std::size_t count) {
+    start.reserve(size + 1);
+    column.begin(size, count);
+    value.reserve(count);
+}
 
 void ConstantHessian::Part::append(int toColumn, double scalar) {
     column.push_back(toColumn);
     value.push_back(scalar);
 }
 
-/// To the memory that it needs.
-void ConstantHessian::Part::resize(int size) {
-    column.resize(size);
-    value.resize(size);
-    column.shrink_to_fit();
-    value.shrink_to_fit();
-}
-
-void ConstantHessian::endRow() {
-    for (Part* part : {&m_inside, &m_beside}) part->start.push_back(static_cast<int>(part->column.size()));
-}
-
 void ConstantHessian::split(const BlockMatrix& pattern) {
-    int begin = 0, kept = 0;
-    for (int row = 0; row + 1 < std::ssize(m_inside.start); ++row) {
-        const int end = m_inside.start[row + 1];
-        for (int k = begin; k < end; ++k) {
-            const int column = m_inside.column[k];
-            if (column == row || pattern.contains(std::max(row, column), std::min(row, column))) {
-                m_inside.column[kept] = column;
-                m_inside.value[kept++] = m_inside.value[k];
-            } else {
-                m_beside.append(column, m_inside.value[k]);
+    const List listed = std::exchange(m_listed, {});
+    const auto forEntries = [&](const auto& visit, const auto& endRow) {
+        for (int row = 0; row + 1 < std::ssize(listed.start); ++row) {
+            for (int k = listed.start[row]; k < listed.start[row + 1]; ++k) {
+                const int column = listed.column[k];
+                visit(column == row || pattern.contains(std::max(row, column), std::min(row, column)), k);
             }
+            endRow();
         }
-        begin = end;
-        m_inside.start[row + 1] = kept;
-        m_beside.start[row + 1] = static_cast<int>(m_beside.column.size());
-    }
-    m_inside.resize(kept);
-    m_beside.resize(static_cast<int>(m_beside.column.size()));
+    };
+    std::size_t inside = 0;
+    forEntries([&](bool isInside, int) { inside += isInside ? 1 : 0; }, [] {});
+    m_inside.begin(pattern.size(), inside);
+    m_beside.begin(pattern.size(), listed.value.size() - inside);
+    const auto place = [&](bool isInside, int k) {
+        (isInside ? m_inside : m_beside).append(listed.column[k], listed.value[k]);
+    };
+    forEntries(place, [&] {
+        m_inside.endRow();
+        m_beside.endRow();
+    });
 }
 
 }  // namespace jacket

@@ -39,7 +39,9 @@ class StepSystem {
         rhs.setZero(3, matrix.size());
         matrix.setBeside(constant, constant ? m_stiffnessFactor : 0.0);
         if (!constant) return matrix.setZero();
-        for (int row = 0; row < matrix.size(); ++row) fillRow(row, constant->inside());
+        constant->visit([&](const auto& inside, const auto&) {
+            for (int row = 0; row < matrix.size(); ++row) fillRow(row, inside);
+        });
     }
 
     /// One term of an energy. `slots`: see StencilSlots.
@@ -105,7 +107,7 @@ class StepSystem {
     }
 
   private:
-    void fillRow(int row, const ConstantHessian::Rows& scalars) {
+    void fillRow(int row, const auto& scalars) {
         matrix.diagonal()[row].setZero();
         for (int k = matrix.rowBegin(row); k < matrix.rowEnd(row); ++k) matrix.lower()[k].setZero();
         int block = matrix.rowBegin(row);
