@@ -111,8 +111,9 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
                     obstacle.shape->pieces.size() == 1 && obstacle.shape->concave.empty(),
                     contacts};
         for (const auto& piece : obstacle.shape->pieces) {
-            findVertices(query, *piece);
+            markOutside(query, *piece);
             if (query.wantsFaces()) findFaces(query, *piece);
+            findVertices(query, *piece);
         }
         for (std::size_t k = 0; k < obstacle.shape->concave.size(); ++k)
             findConcave(query, obstacle.shape->concave[k], m_patches[pair][k]);
@@ -125,7 +126,7 @@ void ShellContacts::advance(std::span<const Vec6> twists, double time) {
     for (std::size_t b = 0; b < m_start.size(); ++b) m_start[b] = moved(m_start[b], twists[b], time);
 }
 
-void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
+void ShellContacts::markOutside(const Query& query, const ConvexPiece& piece) {
     Vec3 lower, upper;
     worldBounds(piece, query.frame, lower, upper);
     const double reach = std::max(query.vertexReach, query.faceReach) + query.thickness();
@@ -133,7 +134,6 @@ void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
     upper.array() += std::max(reach, 0.0);
     const int n = query.shellBody.vertexCount();
     m_memory.outside.resize(n);
-    const Frame toBody = query.frame.inverse(Eigen::Isometry);
     for (int i = 0; i < n; ++i) {
         const Vec3 x = query.x.col(i);
         unsigned char outside = 0;
@@ -142,8 +142,18 @@ void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
             outside |= static_cast<unsigned char>((x[k] > upper[k]) << (2 * k + 1));
         }
         m_memory.outside[i] = outside;
-        if (outside) continue;
-        if (const auto surface = piece.touch(Vec3(toBody * x), query.vertexReach + query.thickness()))
+    }
+}
+
+/// A convex body has one side, which is what its contacts are made with; of others that shows when all are known.
+void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
+    const Frame toBody = query.frame.inverse(Eigen::Isometry);
+    for (int i = 0; i < query.shellBody.vertexCount(); ++i) {
+        if (m_memory.outside[i]) continue;
+        const auto surface = piece.touch(Vec3(toBody * Vec3(query.x.col(i))), query.vertexReach + query.thickness());
+        if (surface && query.isConvex)
+            addVertex(query, i, 0, *surface);
+        else if (surface)
             append(m_memory.candidates, {i, *surface});
     }
 }
@@ -222,8 +232,6 @@ void ShellContacts::addFace(Query& query, int triangle, const TrianglePoint& tou
 
 /// Of all that a vertex can touch, what is not covered by something nearer.
 void ShellContacts::addVertices(Query& query) {
-    const HalfEdgeMesh& mesh = query.shellBody.shell().mesh();
-    const int featureCount = mesh.vertexCount() + static_cast<int>(mesh.edges().size()) + mesh.triangleCount();
     auto& candidates = m_memory.candidates;
     const auto isBefore = [](const auto& a, const auto& b) {
         return std::pair(a.vertex, a.surface.distance) < std::pair(b.vertex, b.surface.distance);
@@ -231,14 +239,6 @@ void ShellContacts::addVertices(Query& query) {
     if (!std::is_sorted(candidates.begin(), candidates.end(), isBefore))  // one piece: it is
         std::stable_sort(candidates.begin(), candidates.end(), isBefore);
     makeRoom(query.contacts, candidates.size());
-    const auto add = [&](int vertex, int side, const SurfacePoint& surface) {
-        append(query.contacts, makeContact(query, Feature::vertex(vertex) + side * featureCount, surface,
-                                           {vertex, vertex, vertex}, Vec3::UnitX()));
-    };
-    if (query.isConvex) {
-        for (const auto& candidate : candidates) add(candidate.vertex, 0, candidate.surface);
-        return;
-    }
     std::vector<SurfacePoint>& kept = m_memory.kept;
     for (std::size_t first = 0, next; first < candidates.size(); first = next) {
         const int vertex = candidates[first].vertex;
@@ -249,8 +249,15 @@ void ShellContacts::addVertices(Query& query) {
                 kept.push_back(surface);
         }
         findSides(m_sides[query.pair][vertex], kept);
-        for (std::size_t k = 0; k < kept.size(); ++k) add(vertex, m_memory.sides[k], kept[k]);
+        for (std::size_t k = 0; k < kept.size(); ++k) addVertex(query, vertex, m_memory.sides[k], kept[k]);
     }
+}
+
+void ShellContacts::addVertex(Query& query, int vertex, int side, const SurfacePoint& surface) {
+    const HalfEdgeMesh& mesh = query.shellBody.shell().mesh();
+    const int featureCount = mesh.vertexCount() + static_cast<int>(mesh.edges().size()) + mesh.triangleCount();
+    append(query.contacts, makeContact(query, Feature::vertex(vertex) + side * featureCount, surface,
+                                       {vertex, vertex, vertex}, Vec3::UnitX()));
 }
 
 /// For each surface that a vertex touches the index of the known side that it belongs to: of much the same normal, or

@@ -36,11 +36,13 @@ class ShellContacts final : public ContactDetector {
     const TrianglePatch& wholeOf(const ConcavePiece& piece, double radius);
     static Contact makeContact(const Query& query, int feature, const SurfacePoint& surface,
                                const std::array<int, 3>& vertices, const Vec3& weights);
+    void markOutside(const Query& query, const ConvexPiece& piece);
     void findVertices(Query& query, const ConvexPiece& piece);
     void findFaces(Query& query, const ConvexPiece& piece);
     void findConcave(Query& query, const ConcavePiece& piece, std::unique_ptr<TrianglePatch>& patch);
     void addFace(Query& query, int triangle, const TrianglePoint& touch);
     void addVertices(Query& query);
+    static void addVertex(Query& query, int vertex, int side, const SurfacePoint& surface);
     void setMaterial(Contact& contact);
     using Sides = std::pmr::vector<SurfacePoint>;
     void findSides(Sides& known, std::vector<SurfacePoint>& surfaces);
