@@ -127,7 +127,6 @@ struct IslandSolver::Impl {
     bool unsettled = false;                      ///< contacts of this step have used up their rounds
     double reference = -1.0;                     ///< r^T P^-1 r that the tolerance refers to; < 0: not known
     int lastRounds = 1;                          ///< changes of the contacts in the last step, and one
-    mutable std::vector<Points> at;              ///< where velocities lead each shell
     mutable std::vector<double> elasticAtStart;  ///< of each shell at the start of the step; NaN: not yet asked for [J]
     StepTimes times;                             ///< of the step so far
     StepReport lastReport;
@@ -267,11 +266,9 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
     }
     start.resize(3, count);
     for (Points* seldomUsed : {&newtonFrom, &calmest}) seldomUsed->resize(3, count);
-    at.resize(std::max(at.size(), input.shells.size()));
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const int n = input.shells[k]->vertexCount();
         start.middleCols(offsets[k], n) = input.shells[k]->velocities();
-        at[k].resize(3, n);
     }
     y.setZero(3, count);
     isTwoStep = false;
@@ -396,8 +393,9 @@ double IslandSolver::Impl::incrementalPotential(const IslandInput& input, const 
 double IslandSolver::Impl::elasticEnergyAfter(const IslandInput& input, std::size_t k, const Points& velocities) const {
     const Shell& shell = *input.shells[k];
     const int n = shell.vertexCount();
-    at[k] = shell.positions() + y.middleCols(offsets[k], n) + stepOf[k] * velocities.middleCols(offsets[k], n);
-    return shell.elasticEnergy(at[k]);
+    Points& end = shell.m_assembly->scratch();
+    end = shell.positions() + y.middleCols(offsets[k], n) + stepOf[k] * velocities.middleCols(offsets[k], n);
+    return shell.elasticEnergy(end);
 }
 
 /// Whether the solved step must be linearised again: it stretches an edge by far, or it gains energy. Backward Euler

@@ -33,6 +33,8 @@ class ShellAssembly {
     Energy& membrane() { return *m_energies[0]; }
     const Energy& bending() const { return *m_energies[1]; }
     PlasticFlow flow(const Points& x);
+    /// See StepSystem::scratch.
+    Points& scratch() { return m_system.scratch(); }
 
   private:
     void addPressureStiffness(const Shell& shell, double pressure);

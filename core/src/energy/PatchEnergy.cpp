@@ -36,10 +36,9 @@ struct ConstantRows {
 };
 
 /// visit(rows)
-decltype(auto) visitRows(const Eigen::Matrix<double, 4, Eigen::Dynamic>& x, const ConstantHessian& scalars,
-                         const auto& visit) {
+decltype(auto) visitRows(const double* x, int count, const ConstantHessian& scalars, const auto& visit) {
     return scalars.visit([&](const auto& inside, const auto& beside) {
-        return visit(ConstantRows{inside, beside, x.data(), static_cast<int>(x.cols())});
+        return visit(ConstantRows{inside, beside, x, count});
     });
 }
 
@@ -53,7 +52,7 @@ JACKET_INLINE void addDifference(const Scalars& scalars, int k, const double* x,
 /// digits far from the origin.
 template <class Column>
 JACKET_INLINE void multiplyRow(const ConstantRows<Column>& rows, int i, double (&sum)[4]) {
-    const ConstantHessian::Rows<Column>&inside = rows.inside, &beside = rows.beside;
+    const auto &inside = rows.inside, &beside = rows.beside;
     const double *const x = rows.x, *const xi = x + 4 * i;
     for (double& s : sum) s = 0.0;
     int b = beside.start[i];
@@ -90,7 +89,7 @@ JACKET_INLINE void subtractSquare(const Scalars& scalars, int k, const double* x
 /// x . K x = -sum_{i<j} K_ij |x_j - x_i|^2, for the same reason.
 template <class Column>
 JACKET_KERNEL double constantProduct(const ConstantRows<Column>& rows) {
-    const ConstantHessian::Rows<Column>&inside = rows.inside, &beside = rows.beside;
+    const auto &inside = rows.inside, &beside = rows.beside;
     const double* const x = rows.x;
     Double4 sum{};
     for (int i = 0; i < rows.count; ++i) {
@@ -120,7 +119,6 @@ PatchEnergy::PatchEnergy(const HalfEdgeMesh& mesh, const RestShape& rest, const 
     assembleConstant(mesh.vertexCount());
     const auto isFlatForGood = [](const Element& e) { return !e.isCurved() && !e.canYield(); };
     if (!rest.flattened && std::all_of(m_elements.begin(), m_elements.end(), isFlatForGood)) keepMirroredOnly(rest);
-    m_padded.setZero(4, mesh.vertexCount());
 }
 
 /// What `setUp` fills; vertices that are seen in mirrors may need more.
@@ -292,6 +290,7 @@ void PatchEnergy::collectPairs(std::vector<std::pair<int, int>>& pairs) const {
 }
 
 void PatchEnergy::bind(const BlockMatrix& matrix) {
+    m_matrix = &matrix;
     m_constant.split(matrix);
     m_slots.clear();
     for (Element& e : m_elements) {
@@ -346,8 +345,10 @@ double PatchEnergy::flatValue(const Points& x) const {
     }
     mean = first + mean / static_cast<double>(x.cols());
     const Mat3 map = moments * m_inverseMoments;
-    for (int i = 0; i < x.cols(); ++i) m_padded.col(i).head<3>() = x.col(i) - mean - map * m_flatRest.col(i);
-    return 0.5 * visitRows(m_padded, m_constant, [](const auto& rows) { return constantProduct(rows); });
+    double* const left = m_matrix->padded();
+    for (int i = 0; i < x.cols(); ++i) Eigen::Map<Vec3>(left + 4 * i) = x.col(i) - mean - map * m_flatRest.col(i);
+    return 0.5 * visitRows(left, static_cast<int>(x.cols()), m_constant,
+                           [](const auto& rows) { return constantProduct(rows); });
 }
 
 /// Of a mirrored patch, whose share the constant Hessian does not have.
@@ -362,13 +363,14 @@ void PatchEnergy::addElementGradient(const Element& e, const Points& x, const au
     for (int j = 0; j < 3; ++j) add(v[j], Vec3(normal.slopes.col(j).dot(pull) * normal.n));
 }
 
-void PatchEnergy::pad(const Points& x) const {
-    for (int i = 0; i < x.cols(); ++i) m_padded.col(i).head<3>() = x.col(i);
+const double* PatchEnergy::padded(const Points& x) const {
+    double* const result = m_matrix->padded();
+    for (int i = 0; i < x.cols(); ++i) Eigen::Map<Vec3>(result + 4 * i) = x.col(i);
+    return result;
 }
 
 void PatchEnergy::addGradient(const Points& x, Points& gradient) const {
-    pad(x);
-    visitRows(m_padded, m_constant,
+    visitRows(padded(x), static_cast<int>(x.cols()), m_constant,
               [&](const auto& rows) { addConstantGradient(rows, 0, rows.count, 1.0, gradient.data()); });
     const auto add = [&](int vertex, const Vec3& g) { gradient.col(vertex) += g; };
     for (const Element& e : m_elements) {
@@ -380,9 +382,8 @@ void PatchEnergy::addGradient(const Points& x, Points& gradient) const {
 }
 
 void PatchEnergy::addTo(StepSystem& system, const Points& x, HessianKind kind) const {
-    pad(x);
     const TermSink sink = system.sink();
-    visitRows(m_padded, m_constant, [&](const auto& rows) {
+    visitRows(padded(x), static_cast<int>(x.cols()), m_constant, [&](const auto& rows) {
         runRanges(system.team(), rows.count, kVerticesAtATime,
                   [&](int begin, int end) { addConstantGradient(rows, begin, end, sink.gradientFactor, sink.rhs); });
     });

@@ -75,7 +75,7 @@ class PatchEnergy final : public Energy {
     void addNormalGradient(const Element& e, const TriangleNormal& normal, const Points& x, const auto& add) const;
     void addMirrored(const Element& e, StepSystem& system, const Points& x) const;
     void addNormalTerms(const Element& e, StepSystem& system, const Points& x, HessianKind kind) const;
-    void pad(const Points& x) const;
+    const double* padded(const Points& x) const;
 
     std::vector<Element> m_elements;  ///< of all triangles, or of mirrored patches alone
     std::vector<int> m_vertices;
@@ -87,7 +87,7 @@ class PatchEnergy final : public Energy {
     /// their squares. An affine map of them stores nothing.
     Points m_flatRest;
     Mat3 m_inverseMoments;
-    mutable Eigen::Matrix<double, 4, Eigen::Dynamic> m_padded;  ///< positions, in fours for the machine's sake
+    const BlockMatrix* m_matrix = nullptr;  ///< for its memory for positions in fours
 };
 
 }  // namespace jacket

@@ -129,10 +129,10 @@ void BlockMatrix::multiply(const double* x, double* y) const {
 }
 
 void BlockMatrix::addBeside(const double* x, double* y) const {
-    m_padded.resize(4 * static_cast<std::size_t>(size()));
-    for (int i = 0; i < size(); ++i) std::copy_n(x + 3 * i, 3, m_padded.data() + 4 * i);
+    double* const inFours = padded();
+    for (int i = 0; i < size(); ++i) std::copy_n(x + 3 * i, 3, inFours + 4 * i);
     m_beside->visit([&](const auto&, const auto& scalars) {
-        addScalarRows(ScalarRows{scalars, m_padded.data(), m_besideFactor, size()}, y);
+        addScalarRows(ScalarRows{scalars, inFours, m_besideFactor, size()}, y);
     });
 }
 

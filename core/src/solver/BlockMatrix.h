@@ -51,6 +51,12 @@ class BlockMatrix {
     /// y = A x over `size()` columns starting at x and y (3 doubles each). They must not overlap.
     void multiply(const double* x, double* y) const;
 
+    /// Memory for a vector in fours, for the machine's sake, which the next product takes too. The last ones are 0.
+    double* padded() const {
+        m_padded.resize(4 * m_diagonal.size());
+        return m_padded.data();
+    }
+
     /// Place for the copy in single precision that solves work with, and what they keep of it. Made with the pattern
     /// alone when first asked for; its values are whatever the last solve gave it.
     CompactShell& compact() const;
@@ -61,7 +67,7 @@ class BlockMatrix {
     std::vector<Mat3> m_diagonal, m_lower;
     const ConstantHessian* m_beside = nullptr;
     double m_besideFactor = 0.0;
-    mutable std::vector<double> m_padded;  ///< a vector in fours, for the machine's sake
+    mutable std::vector<double> m_padded;
     mutable std::unique_ptr<CompactShell> m_compact;
 };
 

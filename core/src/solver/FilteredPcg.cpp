@@ -89,12 +89,11 @@ PcgReport FilteredPcg::finish(const CoupledSystem& system, const CoupledPrecondi
     for (int start = 0; start < kMostStarts && !(m_rho <= target) && report.iterations < maxIterations; ++start) {
         if (isSingle) {
             const double before = m_rho;
-            m_before = u;
             m_rho = iterateCompact(system, preconditioner, m_rho, target, maxIterations, report.iterations, u);
             system.residual(u, m_r, m_unfiltered);
             if (m_rho <= target && isAsIterated(system)) break;
             if (precondition(system, preconditioner) <= kMostGrowth * before) continue;
-            u = m_before;
+            takeBack(system, u);
             begin(system, preconditioner, u);
             break;
         }
@@ -144,6 +143,7 @@ double FilteredPcg::iterateCompact(const CoupledSystem& system, const CoupledPre
     const int size = static_cast<int>(m_change.size());
     CompactVector &r = m_compactR, &z = m_compactZ, &d = m_compactD, &q = m_compactQ;
     std::fill(m_change.begin(), m_change.end(), 0.0);
+    m_twistsBefore = u.w;
     d.s = z.s;
     d.w = z.w;
     while (!(rho <= kMargin * target) && iterations < maxIterations) {
@@ -166,9 +166,21 @@ double FilteredPcg::iterateCompact(const CoupledSystem& system, const CoupledPre
         ++iterations;
     }
     const std::vector<int>& place = system.compactPlaces();
-    for (int i = 0; i < system.vertexCount(); ++i)
-        u.s.col(i) += Eigen::Map<const Vec3>(m_change.data() + 4 * static_cast<std::size_t>(place[i]));
+    for (int i = 0; i < system.vertexCount(); ++i) {
+        Eigen::Map<Vec3> change(m_change.data() + 4 * static_cast<std::size_t>(place[i]));
+        const Vec3 before = u.s.col(i);
+        u.s.col(i) += change;
+        change = before;
+    }
     return rho;
+}
+
+/// What iterateCompact has made of u.
+void FilteredPcg::takeBack(const CoupledSystem& system, CoupledVector& u) const {
+    const std::vector<int>& place = system.compactPlaces();
+    for (int i = 0; i < system.vertexCount(); ++i)
+        u.s.col(i) = Eigen::Map<const Vec3>(m_change.data() + 4 * static_cast<std::size_t>(place[i]));
+    u.w = m_twistsBefore;
 }
 
 }  // namespace jacket
