@@ -115,7 +115,7 @@ void sortByLevel(const Neighbours& neighbours, Division& division) {
 }
 
 /// `source`: see CompactMatrix::Pattern.
-Mat3 blockFrom(const BlockMatrix& matrix, int source) {
+JACKET_INLINE Mat3 blockFrom(const BlockMatrix& matrix, int source) {
     return source >= 0 ? matrix.lower()[source] : Mat3(matrix.lower()[~source].transpose());
 }
 
