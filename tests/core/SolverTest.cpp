@@ -849,7 +849,7 @@ TEST(CoupledSystemTest, SingleOperatorEqualsDouble) {
         u.resize(21, 2);
         (i < 63 ? u.s.reshaped()(i) : u.w.reshaped()(i - 63)) = 1.0;
         island.system.filter(u);
-        island.system.round(u, x);
+        island.system.round(u.s, u.w, x);
         const std::vector<float> before = x.s;
         island.system.apply(x, y);
         EXPECT_EQ(x.s, before);

@@ -47,7 +47,7 @@ void CoupledSystem::begin(const std::vector<ShellPart>& shells, int vertexCount,
     m_rows.clear();
     m_precision = precision;
     m_team = team;
-    m_last.isValid = false;
+    m_isProductKnown = false;
     m_compactPlaces.resize(vertexCount);
     for (const auto& shell : m_shells) {
         if (precision == Precision::Double && !shell.isCompact) continue;
@@ -80,11 +80,15 @@ void CoupledSystem::start(const Points& v, const Eigen::Matrix<double, 6, Eigen:
 
 void CoupledSystem::velocities(const CoupledVector& u, Points& v) const {
     v = u.s;
-    for (const auto& c : m_constraints) {
-        Vec3 moved = c.carried;
-        if (c.body >= 0) moved += pointVelocity(u.w.col(c.body), c.arm);
-        v.col(c.vertex) += c.tie * moved;
-    }
+    for (const auto& c : m_constraints) v.col(c.vertex) = velocityOf(u, c.vertex);
+}
+
+Vec3 CoupledSystem::velocityOf(const CoupledVector& u, int vertex) const {
+    const VertexConstraint* c = constraintOf(vertex);
+    if (!c) return u.s.col(vertex);
+    Vec3 moved = c->carried;
+    if (c->body >= 0) moved += pointVelocity(u.w.col(c->body), c->arm);
+    return u.s.col(vertex) + c->tie * moved;
 }
 
 void CoupledSystem::multiply(const Points& v, Points& q) const {
@@ -98,27 +102,29 @@ void CoupledSystem::multiply(const Points& v, Points& q) const {
     }
 }
 
-/// A v, which is kept. Where few vertices move otherwise than they did the last time, only their part is computed anew.
-const Points& CoupledSystem::multiplyFromLast(const Points& v) const {
+/// v at u, and A v. Where few vertices move otherwise than they did the last time, only their part is computed anew.
+void CoupledSystem::multiplyFromLast(const CoupledVector& u) const {
     constexpr int kFew = 8;  // of so many vertices one: a column takes longer than a row
-    Product& last = m_last;
+    bool isFew = m_isProductKnown;
     m_moved.clear();
-    for (int i = 0; last.isValid && i < m_vertexCount; ++i)
-        if (v.col(i) != last.v.col(i)) m_moved.push_back(i);
-    if (!last.isValid || kFew * static_cast<int>(m_moved.size()) > m_vertexCount) {
-        last.q.resize(3, m_vertexCount);
-        multiply(v, last.q);
-    } else {
-        auto shell = m_shells.begin();
-        for (const int i : m_moved) {
-            while (i >= shell->offset + shell->matrix->size()) ++shell;
-            shell->matrix->compact().product.addColumn(*shell->matrix, i - shell->offset, v.col(i) - last.v.col(i),
-                                                       last.q.data() + 3 * shell->offset);
-        }
+    for (int i = 0; isFew && i < m_vertexCount; ++i) {
+        const Vec3 velocity = velocityOf(u, i);
+        if (velocity != m_v.col(i)) m_moved.push_back({i, velocity});
+        isFew = kFew * static_cast<int>(m_moved.size()) <= m_vertexCount;
     }
-    last.isValid = m_precision == Precision::Single;  // in double no columns are at hand
-    if (last.isValid) last.v = v;
-    return last.q;
+    m_isProductKnown = m_precision == Precision::Single;  // in double no columns are at hand
+    if (!isFew) {
+        velocities(u, m_v);
+        m_q.resize(3, m_vertexCount);
+        return multiply(m_v, m_q);
+    }
+    auto shell = m_shells.begin();
+    for (const auto& [i, velocity] : m_moved) {
+        while (i >= shell->offset + shell->matrix->size()) ++shell;
+        shell->matrix->compact().product.addColumn(*shell->matrix, i - shell->offset, velocity - m_v.col(i),
+                                                   m_q.data() + 3 * shell->offset);
+        m_v.col(i) = velocity;
+    }
 }
 
 Vec3 CoupledSystem::rowVelocity(const SoftRow& row, const Points& v,
@@ -216,20 +222,22 @@ void CoupledSystem::filter(CompactVector& u) const {
     });
 }
 
-void CoupledSystem::round(const CoupledVector& u, CompactVector& result) const {
+void CoupledSystem::round(const Points& s, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w,
+                          CompactVector& result) const {
     runRanges(m_team, m_vertexCount, kVerticesAtATime, [&](int begin, int end) {
-        for (int i = begin; i < end; ++i) at(result.s, m_compactPlaces[i]) = u.s.col(i).cast<float>();
+        for (int i = begin; i < end; ++i) at(result.s, m_compactPlaces[i]) = s.col(i).cast<float>();
     });
-    result.w = u.w;
+    for (const auto& c : m_constraints)
+        at(result.s, m_compactPlaces[c.vertex]) = (c.free * s.col(c.vertex)).cast<float>();
+    result.w = w;
 }
 
 void CoupledSystem::residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered) const {
-    velocities(u, m_v);
-    const Points& q = multiplyFromLast(m_v);
+    multiplyFromLast(u);
     unfiltered.resize(3, m_vertexCount);
     for (const auto& shell : m_shells)
         unfiltered.middleCols(shell.offset, shell.rhs->cols()) =
-            *shell.rhs - q.middleCols(shell.offset, shell.rhs->cols());
+            *shell.rhs - m_q.middleCols(shell.offset, shell.rhs->cols());
     m_w.resize(6, bodyCount());
     for (int b = 0; b < bodyCount(); ++b) m_w.col(b) = m_freeTwist[b] - u.w.col(b);
     momentum(m_w, r.w);
@@ -238,12 +246,11 @@ void CoupledSystem::residual(const CoupledVector& u, CoupledVector& r, Points& u
         for (int a = 0; a < 3; ++a) unfiltered.col(row.vertices[a]) += row.weights[a] * f;
         if (row.body >= 0) r.w.col(row.body) -= pointImpulse(f, row.arm);
     }
+    for (const auto& c : m_constraints)
+        if (c.body >= 0) r.w.col(c.body) += pointImpulse(c.tie * unfiltered.col(c.vertex), c.arm);
+    if (m_precision == Precision::Single) return;
     r.s = unfiltered;
-    for (const auto& c : m_constraints) {
-        const Vec3 f = unfiltered.col(c.vertex);
-        if (c.body >= 0) r.w.col(c.body) += pointImpulse(c.tie * f, c.arm);
-        r.s.col(c.vertex) = c.free * f;
-    }
+    for (const auto& c : m_constraints) r.s.col(c.vertex) = c.free * unfiltered.col(c.vertex);
 }
 
 void CoupledSystem::filter(CoupledVector& u) const {

@@ -131,10 +131,11 @@ class CoupledSystem {
     /// The same in single precision. `u` is changed on the way, and left as it was.
     void apply(CompactVector& u, CompactVector& q) const;
     void filter(CompactVector& u) const;
-    /// u rounded.
-    void round(const CoupledVector& u, CompactVector& result) const;
-    /// r = filtered right side minus operator at u. `unfiltered` receives (b - A v) of every vertex: minus the
-    /// reactions. Where a solve starts it differs from the last one's only where contacts do.
+    /// s filtered and rounded, and w.
+    void round(const Points& s, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, CompactVector& result) const;
+    /// r = filtered right side minus operator at u; in single precision r.w alone, as `round` makes the rest of
+    /// `unfiltered`, which receives (b - A v) of every vertex: minus the reactions. Where a solve starts it differs
+    /// from the last one's only where contacts do.
     void residual(const CoupledVector& u, CoupledVector& r, Points& unfiltered) const;
     /// Zero in the constrained directions.
     void filter(CoupledVector& u) const;
@@ -144,12 +145,13 @@ class CoupledSystem {
     Vec3 rowVelocity(const SoftRow& row, const Points& v, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) const;
 
   private:
-    struct Product {
-        Points v, q;  ///< A v of all shells
-        bool isValid = false;
+    struct Moved {
+        int vertex;
+        Vec3 velocity;
     };
+    Vec3 velocityOf(const CoupledVector& u, int vertex) const;
     void multiply(const Points& v, Points& q) const;
-    const Points& multiplyFromLast(const Points& v) const;
+    void multiplyFromLast(const CoupledVector& u) const;
     std::vector<ShellPart> m_shells;
     int m_vertexCount = 0;
     std::vector<Mat6> m_mass;
@@ -162,9 +164,9 @@ class CoupledSystem {
     WorkerTeam* m_team = nullptr;
     std::vector<int> m_compactPlaces;
     mutable std::vector<Eigen::Vector3f> m_saved;
-    mutable Product m_last;            ///< of the present matrices
-    mutable std::vector<int> m_moved;  ///< vertices: see multiplyFromLast
-    mutable Points m_v, m_q;
+    mutable Points m_v, m_q;                ///< velocities, and A v of all shells
+    mutable bool m_isProductKnown = false;  ///< of the present matrices; in single precision
+    mutable std::vector<Moved> m_moved;     ///< see multiplyFromLast
     mutable Eigen::Matrix<double, 6, Eigen::Dynamic> m_w;
 };
 

@@ -40,14 +40,13 @@ JACKET_KERNEL void turnKernel(std::size_t size, float beta, const float* z, floa
 void FilteredPcg::resize(const CoupledSystem& system) {
     const int n = system.vertexCount(), bodies = system.bodyCount();
     const auto fits = [&](const CoupledVector& v) { return v.s.cols() == n && v.w.cols() == bodies; };
-    if (!fits(m_r)) m_r.resize(n, bodies);
     if (system.precision() == Precision::Double) {
-        for (CoupledVector* v : {&m_z, &m_q})
+        for (CoupledVector* v : {&m_r, &m_z, &m_q})
             if (!fits(*v)) v->resize(n, bodies);
         return;
     }
     m_change.resize(4 * static_cast<std::size_t>(n));
-    for (CompactVector* v : {&m_compactR, &m_compactZ, &m_compactD, &m_compactQ})
+    for (CompactVector* v : {&m_compactR, &m_compactZ, &m_compactD})
         if (v->s.size() != m_change.size() || v->w.cols() != bodies) v->resize(n, bodies);
 }
 
@@ -61,13 +60,13 @@ double FilteredPcg::dot(WorkerTeam* team, const CompactVector& a, const CompactV
     return std::accumulate(m_partSums.begin(), m_partSums.end(), 0.0) + a.w.cwiseProduct(b.w).sum();
 }
 
-/// Of m_r, into m_z; returns r^T P^-1 r.
+/// Of the residual, into z; returns r^T P^-1 r.
 double FilteredPcg::precondition(const CoupledSystem& system, const CoupledPreconditioner& preconditioner) {
     if (system.precision() == Precision::Double) {
         preconditioner.apply(system, m_r, m_z);
         return m_rho = m_r.dot(m_z);
     }
-    system.round(m_r, m_compactR);
+    system.round(m_unfiltered, m_r.w, m_compactR);
     preconditioner.apply(system, m_compactR, m_compactZ);
     return m_rho = dot(system.team(), m_compactR, m_compactZ);
 }
@@ -125,10 +124,10 @@ double FilteredPcg::iterate(const CoupledSystem& system, const CoupledPreconditi
     return rho;
 }
 
-/// Whether m_r is what the iterations took it for, so that its norm need not be measured.
+/// Whether the residual is what the iterations took it for, so that its norm need not be measured.
 bool FilteredPcg::isAsIterated(const CoupledSystem& system) {
     constexpr double kSame = 0.05;
-    system.round(m_r, m_compactZ);
+    system.round(m_unfiltered, m_r.w, m_compactZ);
     runRanges(system.team(), static_cast<int>(m_compactZ.s.size()), kFloatsAtATime,
               [&](int i, int end) { turnKernel(end - i, -1.0f, m_compactR.s.data() + i, m_compactZ.s.data() + i); });
     m_compactZ.w = m_compactR.w - m_compactZ.w;
@@ -141,7 +140,7 @@ double FilteredPcg::iterateCompact(const CoupledSystem& system, const CoupledPre
     constexpr double kMargin = 0.9;  // the residual as the iterations know it is not quite the true one
     WorkerTeam* const team = system.team();
     const int size = static_cast<int>(m_change.size());
-    CompactVector &r = m_compactR, &z = m_compactZ, &d = m_compactD, &q = m_compactQ;
+    CompactVector &r = m_compactR, &z = m_compactZ, &d = m_compactD, &q = m_compactZ;
     std::fill(m_change.begin(), m_change.end(), 0.0);
     m_twistsBefore = u.w;
     d.s = z.s;

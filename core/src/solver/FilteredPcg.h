@@ -42,9 +42,10 @@ class FilteredPcg {
                           double target, int maxIterations, int& iterations, CoupledVector& u);
     void takeBack(const CoupledSystem& system, CoupledVector& u) const;
     bool isAsIterated(const CoupledSystem& system);
-    CoupledVector m_r, m_z, m_d, m_q;
-    double m_rho = 0.0;  ///< r^T P^-1 r of m_r
-    CompactVector m_compactR, m_compactZ, m_compactD, m_compactQ;
+    CoupledVector m_r, m_z, m_d, m_q;  ///< in single precision r.w alone
+    double m_rho = 0.0;                ///< r^T P^-1 r
+    CompactVector m_compactR, m_compactD;
+    CompactVector m_compactZ;        ///< P^-1 r, and A d until the next r is known
     std::vector<double> m_partSums;  ///< of a dot product
     std::vector<double> m_change;    ///< of u.s, four a vertex as in a CompactVector; then what u.s was before
     Eigen::Matrix<double, 6, Eigen::Dynamic> m_twistsBefore;  ///< what u.w was
