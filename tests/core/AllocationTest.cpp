@@ -88,7 +88,7 @@ std::size_t heapInUse() {
 /// Of a cloth with what its solver keeps, without contacts; matrices and factors are most of it.
 TEST(Memory, OfAVertexOfClothIsBounded) {
     constexpr int kCells = 70;
-    constexpr std::size_t kMostOfAVertex = 3500;
+    constexpr std::size_t kMostOfAVertex = 2500;
     const std::size_t before = heapInUse();
     Shell shell(makeGrid({.size = {1, 1}, .cells = {kCells, kCells}}),
                 {.young = 1e6, .thickness = 1e-3, .density = 200.0});
