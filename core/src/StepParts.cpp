@@ -34,7 +34,6 @@ StepParts::StepParts(const IslandInput& whole, const StepReport& failed)
     for (const Shell* shell : whole.shells) m_start.push_back({shell->m_x, shell->m_v, shell->m_pinTarget});
     m_part.bodies = m_bodies;
     m_part.anchors = m_anchors;
-    m_turns.assign(m_bodies.size(), Mat3::Identity());
     for (CoupledBody& body : whole.bodies) body.impulse = body.motion = Vec6::Zero();
     shorten(failed);
 }
@@ -111,8 +110,7 @@ void StepParts::moveBodies() {
         twists.push_back(body.twist);
         body.position += body.motion.head<3>();
         if (!body.prescribed) body.startTwist = body.twist;
-        m_turns[b] = turnOf(body.motion) * m_turns[b];
-        const Eigen::AngleAxisd turn(m_turns[b]);
+        const Eigen::AngleAxisd turn(Mat3(turnOf(body.motion) * turnOf(whole.motion)));
         whole.motion.head<3>() += body.motion.head<3>();
         whole.motion.tail<3>() = turn.angle() * turn.axis();
         whole.twist = body.twist;

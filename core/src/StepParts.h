@@ -28,7 +28,7 @@ class StepParts {
     void add(const StepReport& solved);
     bool areDone() const { return m_ticks == kTicks || !m_sum.finite; }
     /// Of the whole step.
-    StepReport& report() { return m_sum; }
+    const StepReport& report() const { return m_sum; }
 
   private:
     static constexpr int kTicks = 16;  ///< that the shortest parts would be
@@ -44,7 +44,6 @@ class StepParts {
     IslandInput m_part;
     std::vector<Start> m_start;  ///< of each shell
     std::vector<CoupledBody> m_bodies;
-    std::vector<Mat3> m_turns;  ///< of each body, so far
     std::vector<Anchor> m_anchors;
     int m_ticks = 0;        ///< that are done
     int m_length = kTicks;  ///< of the next part

@@ -109,10 +109,11 @@ struct ShellWorld::Impl {
     FastBodies::Solved solved{&memory};
     /// Of a body whose step was solved in parts, where Bullet's one twist takes it elsewhere than it was solved to go.
     struct Alteration {
+        btRigidBody* body;
         int objectId;
         Frame led, end;
     };
-    std::pmr::unordered_map<const btCollisionObject*, Alteration> alterations{&memory};
+    std::pmr::vector<Alteration> alterations{&memory};
     std::unordered_map<const btCollisionObject*, Push> pushes;
     ContactManifolds manifolds;
     ShellChecks checks;
@@ -280,13 +281,8 @@ void ShellWorld::solveNewcomers(btCollisionWorld& world, double h) {
 /// Bodies that Bullet's one twist a step took elsewhere than they were solved to go. `isSolvedAnew`: Bullet had moved
 /// them before.
 void ShellWorld::alterBodies(btCollisionWorld& world, bool isSolvedAnew) {
-    const auto& objects = world.getCollisionObjectArray();
-    for (int i = 0; i < objects.size() && !m_impl->alterations.empty(); ++i) {
-        const auto found = m_impl->alterations.find(objects[i]);
-        btRigidBody* body = btRigidBody::upcast(objects[i]);
-        if (found == m_impl->alterations.end() || !body || body->isStaticOrKinematicObject()) continue;
-        const auto& [objectId, led, end] = found->second;
-        if (idOf(world, body) != objectId) continue;
+    for (const auto& [body, objectId, led, end] : m_impl->alterations) {
+        if (idOf(world, body) != objectId || body->isStaticOrKinematicObject()) continue;
         const Frame strayed = led.inverse(Eigen::Isometry) * fromBullet(body->getWorldTransform());
         body->setCenterOfMassTransform(toBullet(isSolvedAnew ? end : end * strayed));
         world.updateSingleAabb(body);
@@ -371,8 +367,8 @@ void ShellWorld::accept(Island& island, const StepReport& report, std::span<cons
         const bool isAltered = !coupled[b].prescribed && coupled[b].motion != h * coupled[b].twist;
         if (!report.passed || isAltered) m_impl->solved[object] = coupled[b].twist;  // a bent way is not swept again
         if (isAltered)
-            m_impl->alterations[object] = {idOf(m_world, object), ledByBullet(island.obstacles[b], coupled[b].twist, h),
-                                           endOf(int(b))};
+            m_impl->alterations.push_back({btRigidBody::upcast(object), idOf(m_world, object),
+                                           ledByBullet(island.obstacles[b], coupled[b].twist, h), endOf(int(b))});
     }
 }
 

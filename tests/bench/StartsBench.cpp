@@ -124,8 +124,7 @@ void shelf(double thick, int starts) {
     }
     std::printf(
         "sheet over a board of %4.3g cm    %3d of %d held, %d silently through; %d steps unsettled, at most %d solves "
-        "in "
-        "one\n",
+        "in one\n",
         1e2 * thick, held, starts, silent, unsettled, solves);
 }
 
