@@ -835,6 +835,20 @@ TEST(FilteredPcgTest, SinglePrecisionEqualsDense) {
     }
 }
 
+/// A preconditioner that has factored completely says so no more when the shell is solved in single precision.
+TEST(FilteredPcgTest, CompleteFactorsAreGivenUpForSinglePrecision) {
+    Island island(44, {40}, 0);
+    std::vector<CoupledSystem::ShellPart> parts(island.system.shells().begin(), island.system.shells().end());
+    CoupledPreconditioner preconditioner;
+    for (const bool complete : {true, false}) {
+        parts[0].isFactored = complete;
+        island.system.begin(parts, 40, {}, {}, {}, complete ? Precision::Double : Precision::Single);
+        island.finish();
+        preconditioner.build(island.system, Preconditioner::IncompleteCholesky);
+        EXPECT_EQ(preconditioner.isComplete(), complete);
+    }
+}
+
 TEST(CoupledSystemTest, SingleOperatorEqualsDouble) {
     Island island(43, {13, 8}, 2);
     makeBusy(island, 2.0);

@@ -23,7 +23,7 @@ void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t 
     m_filtered.begin(*part.matrix, kind == Preconditioner::BlockJacobi);
     addRows(system, part);
     filterBlocks(system, part);
-    if (system.precision() == Precision::Double && factorCompletely(system, shell)) return;
+    if (factorCompletely(system, shell)) return;
     if (isCompact(system, shell)) {
         CompactShell& compact = part.matrix->compact();
         compact.factor.factor(m_filtered, system.team());
@@ -40,7 +40,7 @@ void CoupledPreconditioner::buildShell(const CoupledSystem& system, std::size_t 
 
 bool CoupledPreconditioner::factorCompletely(const CoupledSystem& system, std::size_t shell) {
     const auto& part = system.shells()[shell];
-    if (!part.isFactored || !m_filtered.hasLower()) {
+    if (!part.isFactored || !m_filtered.hasLower() || system.precision() == Precision::Single) {
         m_complete[shell].reset();
         return false;
     }
