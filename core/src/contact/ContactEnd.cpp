@@ -12,6 +12,7 @@ constexpr double kDeep = 0.1;        // of an edge: what is worth another solve 
 constexpr double kMostPush = 0.2;    // of an edge: how far pushOut goes
 constexpr int kMostTurns = 8;        // of the walls of a valley, at pushing
 constexpr double kSamePoint = 0.15;  // of an edge: how far it may move in a round
+constexpr double kSameWay = 0.7;     // cosine of the angle between normals that push a vertex much the same way
 constexpr int kFreezeRound = 7;      // from here on normals stay: a triangle that tips to and fro would never settle
 
 }  // namespace
@@ -137,6 +138,29 @@ int ContactResponse::touchOf(const Contact& contact) const {
     return -1;
 }
 
+bool ContactResponse::isNearOthers(int vertex, int body) const {
+    return std::any_of(m_touches.begin(), m_touches.end(), [&](const Touch& touch) {
+        return touch.contact.isVertex() && touch.contact.body != body && globalVertex(touch.contact, 0) == vertex;
+    });
+}
+
+/// Whether a face's contact is nearly at a vertex that is held off the body there, or is being taken out of it, much
+/// the same way. Beside a corner or an edge of the body it is not: the vertex is outside and its triangle cuts across.
+/// Between the edges of two bodies that is left as it is: each would push the triangle into the other.
+bool ContactResponse::isSaidByVertex(const Contact& contact) const {
+    int corner = 0;
+    if (contact.weights.maxCoeff(&corner) < 1.0 - kNearEdge) return false;
+    const int vertex = globalVertex(contact, corner), filter = m_filterOf[vertex];
+    if (m_held[vertex] || isNearOthers(vertex, contact.body)) return true;
+    const auto isAlong = [&](const Vec3& n) { return n.dot(contact.normal) > kSameWay * n.norm(); };
+    for (int k = 0; filter >= 0 && k < m_filters[filter].count; ++k) {
+        const Touch& holds = m_touches[m_filters[filter].touches[k]];
+        if (holds.active && holds.contact.body == contact.body && isAlong(holds.contact.normal)) return true;
+    }
+    const auto raised = m_raised.find(vertex);
+    return raised != m_raised.end() && isAlong(raised->second);
+}
+
 bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round) {
     const int known = touchOf(contact);
     const bool fresh = known < 0;
@@ -146,9 +170,8 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     const double lacks = missing(contact, known);
     if (lacks > -slop) return false;
     if (!contact.isVertex() && !held) {
-        // Nearly at a vertex, that says the same; and of features that share vertices the deepest comes first, for the
-        // others may be cured with it.
-        if (contact.weights.maxCoeff() > 1.0 - kNearEdge) return false;
+        if (isSaidByVertex(contact)) return false;
+        // Of features that share vertices the deepest comes first, for the others may be cured with it.
         m_deepestGap = std::min(m_deepestGap, lacks);
         if (liftVertices(contact, -lacks, solved)) return true;
         for (int a = 0; a < 3; ++a)
@@ -210,7 +233,7 @@ bool ContactResponse::entersThere(const Contact& contact, const Touch& touch, co
     const double along = contact.normal.dot(touch.contact.normal);
     if (along < 0.0) return false;
     const double before = contact.gap - m_input.h * relativeVelocity(touch, solved).dot(contact.normal);
-    return along > 0.7 || !contact.isVertex() || before > -10.0 * m_vertexSlop;
+    return along > kSameWay || !contact.isVertex() || before > -10.0 * m_vertexSlop;
 }
 
 /// Vertices that lie on a curved surface, or close above it, leave their chords inside it. They are lifted by as much,
@@ -233,7 +256,7 @@ bool ContactResponse::liftVertices(const Contact& contact, double by, const Isla
         const auto known = m_index.find(keyOf(vertex));
         if (known == m_index.end()) continue;
         Touch& touch = m_touches[known->second];
-        if (touch.contact.normal.dot(contact.normal) < 0.7 || touch.pressed) continue;
+        if (touch.contact.normal.dot(contact.normal) < kSameWay || touch.pressed) continue;
         if (!touch.active && !isQuick()) continue;
         const double off = touch.active ? touch.offset : endGap(touch, solved);
         if (!(off + by <= most) || (!touch.active && touch.changes >= kMostChanges)) continue;

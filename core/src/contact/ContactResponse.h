@@ -223,6 +223,8 @@ class ContactResponse {
     bool isHeld(const Contact& contact) const;
     bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
     int touchOf(const Contact& contact) const;
+    bool isNearOthers(int vertex, int body) const;
+    bool isSaidByVertex(const Contact& contact) const;
     bool closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round);
     bool entersThere(const Contact& contact, const Touch& touch, const IslandVelocities& solved) const;
     void putDown(const Contact& contact);
