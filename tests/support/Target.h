@@ -66,14 +66,16 @@ struct Target : BulletScene {
     }
 };
 
-/// A sheet of cotton, 1 m, that comes down at `speed` [m/s] over a fixed board smaller than itself, `thick` [m].
+/// A sheet of cotton, 1 m, `cells` a side, that comes down at `speed` [m/s] over a fixed board smaller than itself,
+/// `thick` [m].
 struct Shelf : BulletScene {
     const btVector3 half;
+    btRigidBody& board;
     ShellBody& sheet;
-    Shelf(double thick, const Vec3& from, double speed)
+    Shelf(double thick, const Vec3& from, double speed, int cells = 30)
         : half(btScalar(0.2), btScalar(0.5 * thick), btScalar(0.15)),
-          sheet(shells->add(squareSheet(1, 30), materials::cotton())) {
-        addBox(half, 0, btVector3(0, 0, 0));
+          board(addBox(half, 0, btVector3(0, 0, 0))),
+          sheet(shells->add(squareSheet(1, cells), materials::cotton())) {
         place(sheet, from);
         sheet.setVelocity(btVector3(0, btScalar(-speed), 0));
         const Points& x = sheet.shell().positions();

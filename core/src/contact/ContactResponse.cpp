@@ -54,11 +54,11 @@ ContactResponse::Key ContactResponse::keyOf(const Contact& c) const {
 }
 
 /// What the last step knew of a contact. A point of a face may have moved to a neighbouring one since.
-const ContactResponse::Memory* ContactResponse::remembered(const Contact& c) const {
+ContactResponse::Memory* ContactResponse::remembered(const Contact& c) {
     const Key key = keyOf(c);
     if (const auto known = m_memory.find(key); known != m_memory.end()) return &known->second;
     if (c.isVertex()) return nullptr;
-    const Memory* nearest = nullptr;
+    Memory* nearest = nullptr;
     double least = kSameContact * m_edge[c.shell];
     const HalfEdgeMesh& mesh = m_input.shells[c.shell]->mesh();
     const auto& [shell, body, feature] = key;
@@ -72,6 +72,23 @@ const ContactResponse::Memory* ContactResponse::remembered(const Contact& c) con
         nearest = &other->second;
     }
     return nearest;
+}
+
+/// Of the faces' contacts that have been found again.
+void ContactResponse::findHeirs() {
+    for (auto& [key, memory] : m_memory) memory.heir = -1;
+    for (const Contact& contact : m_found) {
+        if (contact.isVertex()) continue;
+        if (const auto known = m_memory.find(keyOf(contact)); known != m_memory.end()) inherits(contact, known->second);
+    }
+}
+
+/// Whether a contact is the one that goes on from what is remembered; others near it only know of its friction. All
+/// held because one was, they would pull, and letting them go takes rounds in which those that bear are lost.
+bool ContactResponse::inherits(const Contact& c, Memory& memory) const {
+    const int feature = std::get<2>(keyOf(c));
+    if (memory.heir < 0) memory.heir = feature;
+    return memory.heir == feature;
 }
 
 void ContactResponse::place(Touch& touch, const Contact& contact) const {
@@ -146,6 +163,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     m_found.clear();
     input.contacts->find({m_startPoses, m_still, 0.0}, reach, m_memory.empty() ? kNone : 10.0 * m_vertexSlop, m_found);
     findRoomBesideFaces();
+    findHeirs();
     makeRoomFor(m_found.size(), m_touches);
     for (const Contact& contact : m_found) addAtStart(contact, y);
     findFast();
@@ -182,7 +200,7 @@ double ContactResponse::creepSpeed() const {
 void ContactResponse::addAtStart(const Contact& contact, Points& y) {
     Touch touch = makeTouch(contact);
     touch.startGap = contact.gap;
-    const Memory* memory = remembered(contact);
+    Memory* const memory = remembered(contact);
     if (!contact.isVertex() && !memory) return;  // found at the end of the step if it matters
     if (memory && memory->offset > 0.0) {
         const auto faces = m_room.find(globalVertex(contact, 0));
@@ -200,7 +218,8 @@ void ContactResponse::addAtStart(const Contact& contact, Points& y) {
         touch.slip = memory->slip;
         touch.slip.limit *= scale;
         touch.slip.held = tangential(touch.contact.normal) * touch.slip.held * scale;
-        touch.active = touch.active || (memory->impulse > 0.0 && touch.contact.gap < 10.0 * m_vertexSlop);
+        const double near = inherits(contact, *memory) ? 10.0 * m_vertexSlop : m_vertexSlop;
+        touch.active = touch.active || (memory->impulse > 0.0 && touch.contact.gap < near);
     }
     const auto [known, fresh] = m_index.try_emplace(keyOf(contact), static_cast<int>(m_touches.size()));
     if (!fresh && !isRather(touch, m_touches[known->second], memory)) return;

@@ -138,6 +138,7 @@ class ContactResponse {
         Vec3 point;
         bool isVertex;
         std::array<int, 3> vertices;
+        int heir = -1;  ///< feature of the contact that goes on from it
     };
     /// The contacts that share one vertex's filter entry: up to three normals, against bodies of prescribed motion, or
     /// one against a dynamic body.
@@ -158,7 +159,9 @@ class ContactResponse {
     /// Projector on the directions across a normal.
     static Mat3 tangential(const Vec3& n) { return Mat3::Identity() - n * n.transpose(); }
     Key keyOf(const Contact& c) const;
-    const Memory* remembered(const Contact& c) const;
+    Memory* remembered(const Contact& c);
+    void findHeirs();
+    bool inherits(const Contact& c, Memory& memory) const;
     Touch makeTouch(const Contact& contact) const;
     void add(const Touch& touch);
     Vec3 carriedOf(const Touch& touch) const;
