@@ -111,7 +111,8 @@ struct IslandSolver::Impl {
     std::vector<double> stepOf;      ///< of each shell, as its integrator counts it [s]
     std::vector<char> factored;      ///< shells: completely
     bool mayBeShorter = false;       ///< the step that is being solved
-    bool givesWay = true;            ///< false, as long as anything touches: see pushesStrain
+    bool givesWay = true;            ///< false for as long as wouldBeStrained says: see pushesStrain
+    int stepsInFull = 0;             ///< that have been taken since givesWay became false
     Points lastChange;               ///< dv of the last step
     Points expected;                 ///< velocities if that goes on
     CoupledVector u;
@@ -174,6 +175,7 @@ struct IslandSolver::Impl {
     bool isFinite(const IslandInput& input) const;
     void reject();
     bool pushesStrain(const IslandInput& input);
+    bool wouldBeStrained(const IslandInput& input);
     void pushOut(const IslandInput& input, StepReport& report);
     void balance(const IslandInput& input, std::vector<ContactImpulse>& impulses);
     void shift(const IslandInput& input, std::span<const Vec3> onShells, std::vector<ContactImpulse>& impulses);
@@ -206,6 +208,7 @@ void IslandSolver::Impl::attempt(const IslandInput& input) {
     impulseShare = 1.0;
     unsettled = false;
     times = {};
+    givesWay = givesWay || !wouldBeStrained(input);
     gather(input);
     LapTimer lap(input);
     beginContacts(input);
@@ -213,6 +216,7 @@ void IslandSolver::Impl::attempt(const IslandInput& input) {
     solveStep(input, report);  // A, b; filtered PCG until the contacts agree
     if (!report.limited && pushesStrain(input)) {
         givesWay = false;
+        stepsInFull = 0;
         gather(input);
         beginContacts(input);
         solveStep(input, report);
@@ -832,6 +836,16 @@ void IslandSolver::Impl::reject() {
 bool IslandSolver::Impl::isFinite(const IslandInput& input) const {
     const auto isGiven = [](const CoupledBody& b) { return b.twist.allFinite() && b.impulse.allFinite(); };
     return v.allFinite() && y.allFinite() && std::all_of(input.bodies.begin(), input.bodies.end(), isGiven);
+}
+
+/// Sheet metal is strained by every push, of however little, for as long as anything touches it; cloth that once was
+/// lies as before soon after.
+bool IslandSolver::Impl::wouldBeStrained(const IslandInput& input) {
+    constexpr int kSteps = 10;
+    const double kick = (input.h * input.gravity).squaredNorm();
+    return ++stepsInFull < kSteps || std::any_of(input.shells.begin(), input.shells.end(), [&](const Shell* shell) {
+        return strainOfPush(*shell, response.slop()) > kMostEnergyGain * 0.5 * shell->masses().sum() * kick;
+    });
 }
 
 /// Whether pushOut would strain the shells, which then do not give way to it: sheet metal that stands on its edge, a
