@@ -3,7 +3,7 @@
 #include <csignal>
 #include <iostream>
 
-#include "Commands.h"
+#include "Result.h"
 
 namespace jacket::demo {
 
