@@ -19,7 +19,7 @@ TEST(WorkerTeam, DoesEveryPartOnce) {
     for (const int threads : {1, 2, 3, 5}) {
         WorkerTeam team(threads);
         EXPECT_EQ(team.threads(), threads);
-        for (const int count : {0, 1, 2, 7, 100}) {
+        for (const int count : {0, 1, 2, 7, 100, 65535, 140000}) {  // one piece has 65535 at most
             std::vector<std::atomic<int>> calls(count);
             team.run(count, [&](int i) { ++calls[i]; });
             for (const auto& call : calls) EXPECT_EQ(call, 1);

@@ -20,8 +20,9 @@ class WorkerTeam {
 
     int threads() const { return static_cast<int>(m_workers.size()) + 1; }
 
-    /// Calls part(i) once for every i = 0 ... count-1, on whichever threads are free, and returns when all calls have.
-    /// They start in this order. They must not throw, nor ask this team for anything.
+    /// Calls part(i) once for every i = 0 ... count-1, and returns when all calls have. The thread that asks takes the
+    /// first ones and the others take the last ones, until these meet: in loops over the same data, much of it stays
+    /// with the same core. The calls must not throw, nor ask this team for anything.
     template <class Part>
     void run(int count, const Part& part) {
         share(
@@ -30,15 +31,18 @@ class WorkerTeam {
 
   private:
     using Call = void (*)(const void*, int);
+    enum class End { First, Last };
     void share(int count, Call call, const void* work);
-    bool doPart();
+    void shareSome(int begin, int count);
+    bool doPart(End from);
     void waitForWork();
     void dismiss();
-    /// Number of the piece of work in the upper half; in the lower how many of its parts nobody has taken.
+    /// Number of the piece of work in the upper half; in the quarters below it, which of its parts nobody has taken:
+    /// the first of them, and the one behind the last.
     alignas(64) std::atomic<std::uint64_t> m_left{0};
     std::atomic<Call> m_call{nullptr};
     std::atomic<const void*> m_work{nullptr};
-    std::atomic<int> m_count{0};                         ///< parts
+    std::atomic<int> m_begin{0};                         ///< what its parts are counted from
     alignas(64) std::atomic<int> m_done{0};              ///< of them
     alignas(64) std::atomic<std::uint32_t> m_pieces{0};  ///< that were ever begun: what sleeping workers wait for
     std::atomic<bool> m_isOver{false};
