@@ -1,6 +1,7 @@
 #include "EdgeStretch.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "Kernel.h"
@@ -39,9 +40,18 @@ JACKET_KERNEL void largestStretch(const HalfEdgeMesh::Edge* edges, int count, co
 }  // namespace
 
 EdgeStretch edgeStretch(const HalfEdgeMesh::Edge* edges, int count, const double* restLength, const double* x,
-                        const double* v, double h) {
+                        const double* v, double h, WorkerTeam* team) {
+    constexpr int kMostParts = 8, kLeastAtATime = 1024;
+    const int length = std::max(kLeastAtATime, (count + kMostParts - 1) / kMostParts);
+    std::array<EdgeStretch, kMostParts> parts;
+    runRanges(team, count, length, [&](int begin, int end) {
+        largestStretch(edges + begin, end - begin, restLength + begin, x, v, h, &parts[begin / length]);
+    });
     EdgeStretch result;
-    largestStretch(edges, count, restLength, x, v, h, &result);
+    for (const EdgeStretch& part : parts) {
+        result.lengthening = std::max(result.lengthening, part.lengthening);
+        result.change = std::max(result.change, part.change);
+    }
     return result;
 }
 

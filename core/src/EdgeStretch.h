@@ -1,5 +1,6 @@
 #pragma once
 #include "jacket/HalfEdgeMesh.h"
+#include "jacket/WorkerTeam.h"
 
 namespace jacket {
 
@@ -11,6 +12,6 @@ struct EdgeStretch {
 
 /// Of `count` edges at positions `x` that move by h v; `restLength` [m]: one of each edge.
 EdgeStretch edgeStretch(const HalfEdgeMesh::Edge* edges, int count, const double* restLength, const double* x,
-                        const double* v, double h);
+                        const double* v, double h, WorkerTeam* team = nullptr);
 
 }  // namespace jacket

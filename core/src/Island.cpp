@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory_resource>
@@ -129,6 +130,7 @@ struct IslandSolver::Impl {
     double reference = -1.0;                     ///< r^T P^-1 r that the tolerance refers to; < 0: not known
     int lastRounds = 1;                          ///< changes of the contacts in the last step, and one
     mutable std::vector<double> elasticAtStart;  ///< of each shell at the start of the step; NaN: not yet asked for [J]
+    mutable std::vector<double> energyMemory;    ///< see Energy::valueBeside
     StepTimes times;                             ///< of the step so far
     StepReport lastReport;
     double partOfStep = 1.0;        ///< that is being solved: what a step may gain, its parts may together
@@ -147,7 +149,10 @@ struct IslandSolver::Impl {
     bool isAnyFactored() const { return std::count(factored.begin(), factored.end(), 0) < std::ssize(factored); }
     void readFreeTwists();
     bool overstretches(const IslandInput& input, bool isAgain) const;
+    Points& endAfter(std::size_t shell, const IslandInput& input, const Points& velocities) const;
     double elasticEnergyAfter(const IslandInput& input, std::size_t shell, const Points& velocities) const;
+    double elasticEnergyGain(const IslandInput& input, std::size_t shell) const;
+    WorkerTeam* teamFor(const IslandInput& input) const { return start.cols() < kLeastForTeam ? nullptr : input.team; }
     double energyGain(const IslandInput& input) const;
     double energyOfMotion(const IslandInput& input, std::size_t shell) const;
     bool bodiesLead(const IslandInput& input) const;
@@ -394,12 +399,41 @@ double IslandSolver::Impl::incrementalPotential(const IslandInput& input, const 
     return sum;
 }
 
-double IslandSolver::Impl::elasticEnergyAfter(const IslandInput& input, std::size_t k, const Points& velocities) const {
+/// Where velocities lead a shell, in its scratch.
+Points& IslandSolver::Impl::endAfter(std::size_t k, const IslandInput& input, const Points& velocities) const {
     const Shell& shell = *input.shells[k];
     const int n = shell.vertexCount();
     Points& end = shell.m_assembly->scratch();
     end = shell.positions() + y.middleCols(offsets[k], n) + stepOf[k] * velocities.middleCols(offsets[k], n);
-    return shell.elasticEnergy(end);
+    return end;
+}
+
+double IslandSolver::Impl::elasticEnergyAfter(const IslandInput& input, std::size_t k, const Points& velocities) const {
+    return input.shells[k]->elasticEnergy(endAfter(k, input, velocities));
+}
+
+/// Of a shell in the solved step [J]. Its sums have one order and cannot be shared, but there are four of them: of
+/// either energy at the end and, unless it is known, at the start. They stand so that two threads that take them from
+/// both ends have as much to do.
+double IslandSolver::Impl::elasticEnergyGain(const IslandInput& input, std::size_t k) const {
+    const Shell& shell = *input.shells[k];
+    WorkerTeam* const team = teamFor(input);
+    const Points& end = endAfter(k, input, v);
+    const bool isStartKnown = !std::isnan(elasticAtStart[k]);
+    if (!team || !end.allFinite()) {
+        if (!isStartKnown) elasticAtStart[k] = shell.elasticEnergy(shell.positions());
+        return shell.elasticEnergy(end) - elasticAtStart[k];
+    }
+    const Energy &membrane = shell.m_assembly->membrane(), &bending = shell.m_assembly->bending();
+    std::array<double, 4> sums{};
+    runParts(team, isStartKnown ? 2 : 4, [&](int i) {
+        if (i == 0) sums[i] = bending.value(end);
+        if (i == 1) sums[i] = membrane.value(end);
+        if (i == 2) sums[i] = bending.valueBeside(shell.positions(), energyMemory);
+        if (i == 3) sums[i] = membrane.value(shell.positions());
+    });
+    if (!isStartKnown) elasticAtStart[k] = sums[3] + sums[2];
+    return sums[1] + sums[0] - elasticAtStart[k];
 }
 
 /// Whether the solved step must be linearised again: it stretches an edge by far, or it gains energy. Backward Euler
@@ -412,8 +446,9 @@ bool IslandSolver::Impl::overstretches(const IslandInput& input, bool isAgain) c
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         const auto edges = shell.mesh().edges();
-        const EdgeStretch stretch = edgeStretch(edges.data(), static_cast<int>(edges.size()), shell.m_restLength.data(),
-                                                shell.positions().data(), v.data() + 3 * offsets[k], stepOf[k]);
+        const EdgeStretch stretch =
+            edgeStretch(edges.data(), static_cast<int>(edges.size()), shell.m_restLength.data(),
+                        shell.positions().data(), v.data() + 3 * offsets[k], stepOf[k], teamFor(input));
         if (stretch.lengthening > kMost) return true;
         isSuspect = isSuspect || stretch.change > kSuspect;
         isToBeAsked = isToBeAsked || strainEnergy(shell, stretch.change) > energyOfMotion(input, k);
@@ -620,9 +655,8 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
             pushed += 0.5 * shell.masses()[i] * part.col(i).squaredNorm() - stepOf[k] * load.dot(mean);
             gain += 0.5 * shell.masses()[i] * part.col(i).squaredNorm() - kinetic - stepOf[k] * load.dot(mean);
         }
-        if (std::isnan(elasticAtStart[k])) elasticAtStart[k] = shell.elasticEnergy(shell.positions());
+        gain += elasticEnergyGain(input, k);
         atStart += elasticAtStart[k];
-        gain += elasticEnergyAfter(input, k, v) - elasticAtStart[k];
     }
     system.momentum(freeTwist, freeMomentum);
     const BodyVectors& twists = endTwists();
@@ -650,7 +684,7 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
 
 void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
     LapTimer lap(input);
-    WorkerTeam* const team = start.cols() < kLeastForTeam ? nullptr : input.team;
+    WorkerTeam* const team = teamFor(input);
     const bool isIncomplete = input.shells[0]->settings().preconditioner == Preconditioner::IncompleteCholesky;
     parts.clear();
     for (std::size_t k = 0; k < input.shells.size(); ++k) {

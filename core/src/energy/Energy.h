@@ -45,7 +45,9 @@ class Energy {
     virtual const ConstantHessian* constantHessian() const { return nullptr; }
     virtual void addTo(StepSystem& system, const Points& x, HessianKind kind) const = 0;  ///< A and b at x
     virtual double value(const Points& x) const = 0;                                      ///< [J]
-    virtual void addGradient(const Points& x, Points& gradient) const = 0;                ///< += dE/dx [N]
+    /// The same, while another thread may ask for the value at other positions: works in `memory`.
+    virtual double valueBeside(const Points& x, std::vector<double>& /*memory*/) const { return value(x); }
+    virtual void addGradient(const Points& x, Points& gradient) const = 0;  ///< += dE/dx [N]
     /// Newton's method on positions and stresses together: until the next call, exact Hessians take in their geometric
     /// part the stresses that the step dx from x was to lead to, not those that it did. Thin shells then need a handful
     /// of steps, not hundreds: stretching answers a finite rotation with stresses that no equilibrium has (Magisano,

@@ -328,14 +328,24 @@ double PatchEnergy::valueOf(const Element& e, const Points& x) const {
 }
 
 double PatchEnergy::value(const Points& x) const {
-    double sum = m_flatRest.cols() > 0 ? flatValue(x) : 0.0;
+    return valueIn(x, m_matrix->padded());
+}
+
+double PatchEnergy::valueBeside(const Points& x, std::vector<double>& memory) const {
+    memory.resize(4 * x.cols());
+    return valueIn(x, memory.data());
+}
+
+/// `memory`: for a vector in fours, of which the last ones are 0 and stay so.
+double PatchEnergy::valueIn(const Points& x, double* memory) const {
+    double sum = m_flatRest.cols() > 0 ? flatValue(x, memory) : 0.0;
     for (const Element& e : m_elements) sum += valueOf(e, x);
     return sum;
 }
 
 /// 1/2 u . K u of what is left of the positions without the affine map of the rest positions nearest to them, which
 /// stores nothing: of sheets that are nearly flat no digits are lost either.
-double PatchEnergy::flatValue(const Points& x) const {
+double PatchEnergy::flatValue(const Points& x, double* memory) const {
     const Vec3 first = x.col(0);
     Vec3 mean = Vec3::Zero();
     Mat3 moments = Mat3::Zero();
@@ -345,9 +355,8 @@ double PatchEnergy::flatValue(const Points& x) const {
     }
     mean = first + mean / static_cast<double>(x.cols());
     const Mat3 map = moments * m_inverseMoments;
-    double* const left = m_matrix->padded();
-    for (int i = 0; i < x.cols(); ++i) Eigen::Map<Vec3>(left + 4 * i) = x.col(i) - mean - map * m_flatRest.col(i);
-    return 0.5 * visitRows(left, static_cast<int>(x.cols()), m_constant,
+    for (int i = 0; i < x.cols(); ++i) Eigen::Map<Vec3>(memory + 4 * i) = x.col(i) - mean - map * m_flatRest.col(i);
+    return 0.5 * visitRows(memory, static_cast<int>(x.cols()), m_constant,
                            [](const auto& rows) { return constantProduct(rows); });
 }
 

@@ -26,6 +26,7 @@ class PatchEnergy final : public Energy {
     const ConstantHessian* constantHessian() const override { return &m_constant; }
     void addTo(StepSystem& system, const Points& x, HessianKind kind) const override;
     double value(const Points& x) const override;
+    double valueBeside(const Points& x, std::vector<double>& memory) const override;
     void addGradient(const Points& x, Points& gradient) const override;
     PlasticFlow flow(const Points& x) override;
 
@@ -70,7 +71,8 @@ class PatchEnergy final : public Energy {
     Vectors derivatives(const Element& e, const Points& x) const;
     Vectors residual(const Element& e, const Points& x) const;
     double valueOf(const Element& e, const Points& x) const;
-    double flatValue(const Points& x) const;
+    double valueIn(const Points& x, double* memory) const;
+    double flatValue(const Points& x, double* memory) const;
     void addElementGradient(const Element& e, const Points& x, const auto& add) const;
     void addNormalGradient(const Element& e, const TriangleNormal& normal, const Points& x, const auto& add) const;
     void addMirrored(const Element& e, StepSystem& system, const Points& x) const;
