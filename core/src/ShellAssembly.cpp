@@ -120,8 +120,8 @@ const StepSystem& ShellAssembly::assemble(const Shell& shell, double h, const Ve
 }
 
 void ShellAssembly::addLoads(const Shell& shell, const Vec3& gravity, double load) {
-    for (int i = 0; i < shell.vertexCount(); ++i)
-        m_system.addForce(i, load * (shell.masses()[i] * gravity + shell.forces().col(i)));
+    m_system.forVertices(
+        [&](int i) { m_system.addForce(i, load * (shell.masses()[i] * gravity + shell.forces().col(i))); });
     if (shell.pressure() == 0.0) return;
     for (int t = 0; t < shell.mesh().triangleCount(); ++t) {
         const auto corners = cornersOf(shell, t);

@@ -7,7 +7,7 @@
 namespace jacket {
 namespace {
 
-constexpr int kVerticesAtATime = 2048, kConstraintsAtATime = 512;  ///< that a thread of a team takes
+constexpr int kVerticesAtATime = 2048, kConstraintsAtATime = 128;  ///< that a thread of a team takes
 
 }  // namespace
 
@@ -236,8 +236,10 @@ void CoupledSystem::residual(const CoupledVector& u, CoupledVector& r, Points& u
     multiplyFromLast(u);
     unfiltered.resize(3, m_vertexCount);
     for (const auto& shell : m_shells)
-        unfiltered.middleCols(shell.offset, shell.rhs->cols()) =
-            *shell.rhs - m_q.middleCols(shell.offset, shell.rhs->cols());
+        runRanges(m_team, static_cast<int>(shell.rhs->cols()), kVerticesAtATime, [&](int begin, int end) {
+            unfiltered.middleCols(shell.offset + begin, end - begin) =
+                shell.rhs->middleCols(begin, end - begin) - m_q.middleCols(shell.offset + begin, end - begin);
+        });
     m_w.resize(6, bodyCount());
     for (int b = 0; b < bodyCount(); ++b) m_w.col(b) = m_freeTwist[b] - u.w.col(b);
     momentum(m_w, r.w);

@@ -9,7 +9,8 @@
 namespace jacket {
 namespace {
 
-constexpr int kFloatsAtATime = 8192;  ///< that a thread of a team takes: a multiple of four
+constexpr int kFloatsAtATime = 8192;  ///< that a thread of a team takes: a multiple of four; decides how sums are made
+constexpr int kFloatsToStep = 4096;   ///< the same where nothing is summed
 
 JACKET_KERNEL double dotKernel(std::size_t size, const float* a, const float* b) {
     Double4 sum{};
@@ -150,14 +151,14 @@ double FilteredPcg::iterateCompact(const CoupledSystem& system, const CoupledPre
         const double curvature = dot(team, d, q);
         if (!(curvature > 0.0)) break;  // lost to rounding, or not finite
         const double alpha = rho / curvature;
-        runRanges(team, size, kFloatsAtATime, [&](int i, int end) {
+        runRanges(team, size, kFloatsToStep, [&](int i, int end) {
             stepKernel(end - i, alpha, d.s.data() + i, q.s.data() + i, m_change.data() + i, r.s.data() + i);
         });
         u.w += alpha * d.w;
         r.w -= alpha * q.w;
         preconditioner.apply(system, r, z);
         const double next = dot(team, r, z);
-        runRanges(team, size, kFloatsAtATime, [&](int i, int end) {
+        runRanges(team, size, kFloatsToStep, [&](int i, int end) {
             turnKernel(end - i, static_cast<float>(next / rho), z.s.data() + i, d.s.data() + i);
         });
         d.w = z.w + (next / rho) * d.w;
@@ -165,12 +166,14 @@ double FilteredPcg::iterateCompact(const CoupledSystem& system, const CoupledPre
         ++iterations;
     }
     const std::vector<int>& place = system.compactPlaces();
-    for (int i = 0; i < system.vertexCount(); ++i) {
-        Eigen::Map<Vec3> change(m_change.data() + 4 * static_cast<std::size_t>(place[i]));
-        const Vec3 before = u.s.col(i);
-        u.s.col(i) += change;
-        change = before;
-    }
+    runRanges(team, system.vertexCount(), kFloatsToStep / 4, [&](int begin, int end) {
+        for (int i = begin; i < end; ++i) {
+            Eigen::Map<Vec3> change(m_change.data() + 4 * static_cast<std::size_t>(place[i]));
+            const Vec3 before = u.s.col(i);
+            u.s.col(i) += change;
+            change = before;
+        }
+    });
     return rho;
 }
 

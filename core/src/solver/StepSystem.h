@@ -39,9 +39,7 @@ class StepSystem {
         rhs.setZero(3, matrix.size());
         matrix.setBeside(constant, constant ? m_stiffnessFactor : 0.0);
         if (!constant) return matrix.setZero();
-        constant->visit([&](const auto& inside, const auto&) {
-            for (int row = 0; row < matrix.size(); ++row) fillRow(row, inside);
-        });
+        constant->visit([&](const auto& inside, const auto&) { forVertices([&](int row) { fillRow(row, inside); }); });
     }
 
     /// One term of an energy. `slots`: see StencilSlots.
@@ -100,10 +98,18 @@ class StepSystem {
     }
 
     void addMass(const Eigen::VectorXd& mass, const Eigen::Ref<const Points>& v, double massDamping) {
-        for (int i = 0; i < matrix.size(); ++i) {
+        forVertices([&](int i) {
             matrix.diagonal()[i].diagonal().array() += mass[i] * (1.0 + m_h * massDamping);
             rhs.col(i) += mass[i] * v.col(i);
-        }
+        });
+    }
+
+    /// visit(vertex) for all of them, which the team may share.
+    void forVertices(const auto& visit) const {
+        constexpr int kVerticesAtATime = 512;
+        runRanges(m_team, matrix.size(), kVerticesAtATime, [&](int begin, int end) {
+            for (int i = begin; i < end; ++i) visit(i);
+        });
     }
 
   private:
