@@ -24,7 +24,8 @@ struct TrianglePoint {
     Vec3 weights;
 };
 
-/// One convex piece of a collision shape, in the frame of the body that owns the shape. Double precision. Thread-safe.
+/// One convex piece of a collision shape, in the frame of the body that owns the shape. Double precision. Thread-safe
+/// unless it asks that shape.
 class ConvexPiece {
   public:
     virtual ~ConvexPiece() = default;
@@ -35,6 +36,8 @@ class ConvexPiece {
     /// Bounds in the body's frame; infinite for planes.
     virtual Vec3 lower() const = 0;
     virtual Vec3 upper() const = 0;
+    /// Whether touch() asks a shape that may be the user's own: not to be done by another thread than the world's.
+    virtual bool asksShape() const = 0;
 };
 
 /// A convex solid known by its support function only, in its own frame. Must be thread-safe.

@@ -17,6 +17,7 @@
 #include <BulletCollision/Gimpact/btGImpactShape.h>
 
 #include <limits>
+#include <type_traits>
 #include <utility>
 
 #include "ClosedForms.h"
@@ -168,6 +169,7 @@ class PlacedPiece final : public ConvexPiece {
     }
     Vec3 lower() const override { return m_lower; }
     Vec3 upper() const override { return m_upper; }
+    bool asksShape() const override { return std::is_same_v<Solid, CcdSolid>; }
 
   private:
     void place(SurfacePoint& s) const {

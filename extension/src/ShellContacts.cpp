@@ -9,7 +9,9 @@
 namespace jacket::bullet {
 namespace {
 
-constexpr double kSameSide = 0.97;  // cosine of the angle below which two normals at a vertex count as one
+constexpr double kSameSide = 0.97;   // cosine of the angle below which two normals at a vertex count as one
+constexpr int kLeastToShare = 1000;  // vertices of a shell from which on threads pay
+constexpr int kAtATime = 1024;       // vertices or triangles that a thread takes
 
 /// Room for so many more, and a few besides. An empty list gives its memory back first.
 template <class T>
@@ -70,17 +72,20 @@ struct ShellContacts::Query {
     double vertexReach, faceReach;
     bool isConvex;  ///< the obstacle is one piece
     std::vector<Contact>& contacts;
+    WorkerTeam* team;  ///< null: the shell is too small to be shared
+    WorkerTeam* teamFor(const ConvexPiece& piece) const { return piece.asksShape() ? nullptr : team; }
     double thickness() const { return shellBody.contactThickness(); }
     bool wantsFaces() const { return faceReach > -std::numeric_limits<double>::infinity(); }
 };
 
 ShellContacts::ShellContacts(std::span<const ShellBody* const> shells, std::span<const Obstacle> obstacles,
-                             std::span<const std::pair<int, int>> pairs, Memory& memory)
+                             std::span<const std::pair<int, int>> pairs, Memory& memory, WorkerTeam* team)
     : m_shells(shells),
       m_obstacles(obstacles),
       m_pairs(pairs),
       m_start(&memory.pool),
       m_memory(memory),
+      m_team(team),
       m_materials(&memory.pool),
       m_byFeature(&memory.pool),
       m_sides(pairs.size(), &memory.pool),
@@ -109,7 +114,8 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
                     std::min(vertexReach, obstacle.body.inner),  // beyond that its nearest point says nothing
                     faceReach,
                     obstacle.shape->pieces.size() == 1 && obstacle.shape->concave.empty(),
-                    contacts};
+                    contacts,
+                    m_shells[shell]->vertexCount() < kLeastToShare ? nullptr : m_team};
         for (const auto& piece : obstacle.shape->pieces) {
             markOutside(query, *piece);
             if (query.wantsFaces()) findFaces(query, *piece);
@@ -126,6 +132,20 @@ void ShellContacts::advance(std::span<const Vec6> twists, double time) {
     for (std::size_t b = 0; b < m_start.size(); ++b) m_start[b] = moved(m_start[b], twists[b], time);
 }
 
+template <class Found>
+void ShellContacts::collect(WorkerTeam* team, int count, std::vector<std::vector<Found>>& lists, const auto& find,
+                            const auto& use) {
+    const int ranges = (count + kAtATime - 1) / kAtATime, atOnce = team ? ranges : 1;
+    if (std::ssize(lists) < atOnce) lists.resize(atOnce);
+    for (int first = 0; first < ranges; first += atOnce) {
+        runParts(team, std::min(atOnce, ranges - first), [&](int i) {
+            lists[i].clear();
+            find((first + i) * kAtATime, std::min((first + i + 1) * kAtATime, count), lists[i]);
+        });
+        for (int i = 0; i < std::min(atOnce, ranges - first); ++i) std::for_each(lists[i].begin(), lists[i].end(), use);
+    }
+}
+
 void ShellContacts::markOutside(const Query& query, const ConvexPiece& piece) {
     Vec3 lower, upper;
     worldBounds(piece, query.frame, lower, upper);
@@ -134,41 +154,54 @@ void ShellContacts::markOutside(const Query& query, const ConvexPiece& piece) {
     upper.array() += std::max(reach, 0.0);
     const int n = query.shellBody.vertexCount();
     m_memory.outside.resize(n);
-    for (int i = 0; i < n; ++i) {
-        const Vec3 x = query.x.col(i);
-        unsigned char outside = 0;
-        for (int k = 0; k < 3; ++k) {
-            outside |= static_cast<unsigned char>((x[k] < lower[k]) << (2 * k));
-            outside |= static_cast<unsigned char>((x[k] > upper[k]) << (2 * k + 1));
+    runRanges(query.team, n, kAtATime, [&](int begin, int end) {
+        for (int i = begin; i < end; ++i) {
+            const Vec3 x = query.x.col(i);
+            unsigned char outside = 0;
+            for (int k = 0; k < 3; ++k) {
+                outside |= static_cast<unsigned char>((x[k] < lower[k]) << (2 * k));
+                outside |= static_cast<unsigned char>((x[k] > upper[k]) << (2 * k + 1));
+            }
+            m_memory.outside[i] = outside;
         }
-        m_memory.outside[i] = outside;
-    }
+    });
 }
 
 /// A convex body has one side, which is what its contacts are made with; of others that shows when all are known.
 void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
     const Frame toBody = query.frame.inverse(Eigen::Isometry);
-    for (int i = 0; i < query.shellBody.vertexCount(); ++i) {
-        if (m_memory.outside[i]) continue;
-        const auto surface = piece.touch(Vec3(toBody * Vec3(query.x.col(i))), query.vertexReach + query.thickness());
-        if (surface && query.isConvex)
-            addVertex(query, i, 0, *surface);
-        else if (surface)
-            append(m_memory.candidates, {i, *surface});
-    }
+    const auto find = [&](int begin, int end, auto& found) {
+        for (int i = begin; i < end; ++i) {
+            if (m_memory.outside[i]) continue;
+            const Vec3 x = toBody * Vec3(query.x.col(i));
+            const auto surface = piece.touch(x, query.vertexReach + query.thickness());
+            if (surface) append(found, {i, *surface});
+        }
+    };
+    const auto use = [&](const Memory::Candidate& found) {
+        if (query.isConvex)
+            addVertex(query, found.vertex, 0, found.surface);
+        else
+            append(m_memory.candidates, found);
+    };
+    collect(query.teamFor(piece), query.shellBody.vertexCount(), m_memory.foundVertices, find, use);
 }
 
 void ShellContacts::findFaces(Query& query, const ConvexPiece& piece) {
     const HalfEdgeMesh& mesh = query.shellBody.shell().mesh();
     const Frame toBody = query.frame.inverse(Eigen::Isometry);
-    for (int t = 0; t < mesh.triangleCount(); ++t) {
-        const auto corners = mesh.triangles().col(t);
-        if (m_memory.outside[corners[0]] & m_memory.outside[corners[1]] & m_memory.outside[corners[2]]) continue;
-        Mat3 triangle;
-        for (int a = 0; a < 3; ++a) triangle.col(a) = toBody * Vec3(query.x.col(corners[a]));
-        const auto touch = piece.touch(triangle, query.faceReach + query.thickness());
-        if (touch) addFace(query, t, *touch);
-    }
+    const auto find = [&](int begin, int end, auto& found) {
+        for (int t = begin; t < end; ++t) {
+            const auto corners = mesh.triangles().col(t);
+            if (m_memory.outside[corners[0]] & m_memory.outside[corners[1]] & m_memory.outside[corners[2]]) continue;
+            Mat3 triangle;
+            for (int a = 0; a < 3; ++a) triangle.col(a) = toBody * Vec3(query.x.col(corners[a]));
+            const auto touch = piece.touch(triangle, query.faceReach + query.thickness());
+            if (touch) append(found, {t, *touch});
+        }
+    };
+    collect(query.teamFor(piece), mesh.triangleCount(), m_memory.foundFaces, find,
+            [&](const Memory::Face& found) { addFace(query, found.triangle, found.touch); });
 }
 
 /// The triangles near the shell; the old ones if they still hold all of them. Bullet's shape is asked about once a
@@ -188,29 +221,37 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
         near.upper.array() += margin;
         patch = std::make_unique<TrianglePatch>(*piece.shape, near);
     }
-    std::vector<SurfacePoint> touched;
-    for (int i = 0; i < x.cols(); ++i) {
-        touched.clear();
-        patch->touch(Vec3(x.col(i)), reach, depth, touched);
-        for (const SurfacePoint& s : touched)
-            append(m_memory.candidates, {i, {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance}});
-    }
-    if (!query.wantsFaces()) return;
-    std::vector<TrianglePoint> faces;
-    for (int t = 0; t < mesh.triangleCount(); ++t) {
-        Mat3 triangle;
-        std::array<ShellEdge, 3> edges;
-        for (int a = 0; a < 3; ++a) {
-            triangle.col(a) = x.col(mesh.triangles()(a, t));
-            const int twin = mesh.twin(3 * t + a);  // its triangle asks about the edge if it comes first
-            edges[a] = twin < 0 ? ShellEdge::kBorder : twin < 3 * t + a ? ShellEdge::kShared : ShellEdge::kLeftOut;
+    const auto place = [&](const SurfacePoint& s) -> SurfacePoint {
+        return {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance};
+    };
+    const auto findVerticesIn = [&](int begin, int end, auto& found) {
+        std::vector<SurfacePoint> touched;
+        for (int i = begin; i < end; ++i) {
+            touched.clear();
+            patch->touch(Vec3(x.col(i)), reach, depth, touched);
+            for (const SurfacePoint& surface : touched) append(found, {i, place(surface)});
         }
-        faces.clear();
-        patch->touch(triangle, edges, faceReach, depth, faces);
-        for (const auto& [surface, weights] : faces)
-            addFace(query, t,
-                    {{piece.frame * surface.point, piece.frame.linear() * surface.normal, surface.distance}, weights});
-    }
+    };
+    collect(query.team, query.shellBody.vertexCount(), m_memory.foundVertices, findVerticesIn,
+            [&](const Memory::Candidate& found) { append(m_memory.candidates, found); });
+    if (!query.wantsFaces()) return;
+    const auto findFacesIn = [&](int begin, int end, auto& found) {
+        std::vector<TrianglePoint> touched;
+        for (int t = begin; t < end; ++t) {
+            Mat3 triangle;
+            std::array<ShellEdge, 3> edges;
+            for (int a = 0; a < 3; ++a) {
+                triangle.col(a) = x.col(mesh.triangles()(a, t));
+                const int twin = mesh.twin(3 * t + a);  // its triangle asks about the edge if it comes first
+                edges[a] = twin < 0 ? ShellEdge::kBorder : twin < 3 * t + a ? ShellEdge::kShared : ShellEdge::kLeftOut;
+            }
+            touched.clear();
+            patch->touch(triangle, edges, faceReach, depth, touched);
+            for (const auto& [surface, weights] : touched) append(found, {t, {place(surface), weights}});
+        }
+    };
+    collect(query.team, mesh.triangleCount(), m_memory.foundFaces, findFacesIn,
+            [&](const Memory::Face& found) { addFace(query, found.triangle, found.touch); });
 }
 
 void ShellContacts::addFace(Query& query, int triangle, const TrianglePoint& touch) {

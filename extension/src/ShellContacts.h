@@ -8,6 +8,7 @@
 
 #include "Obstacles.h"
 #include "TrianglePatch.h"
+#include "jacket/WorkerTeam.h"
 #include "jacket/bullet/ShellBody.h"
 
 namespace jacket::bullet {
@@ -22,9 +23,10 @@ class ShellContacts final : public ContactDetector {
   public:
     class Memory;
     /// `pairs`: (shell, obstacle) indices that Bullet's broadphase found near each other. All that is given must
-    /// outlive this.
+    /// outlive this. `team` shares the search in large shells, but for what asks shapes of the user's; the contacts and
+    /// their order are the same.
     ShellContacts(std::span<const ShellBody* const> shells, std::span<const Obstacle> obstacles,
-                  std::span<const std::pair<int, int>> pairs, Memory& memory);
+                  std::span<const std::pair<int, int>> pairs, Memory& memory, WorkerTeam* team = nullptr);
     void find(const ContactPose& pose, double vertexReach, double faceReach, std::vector<Contact>& contacts) override;
     void sweep(const ContactSweep& motion, std::vector<Contact>& contacts) override;
     void advance(std::span<const Vec6> twists, double time) override;
@@ -36,6 +38,11 @@ class ShellContacts final : public ContactDetector {
     const TrianglePatch& wholeOf(const ConcavePiece& piece, double radius);
     static Contact makeContact(const Query& query, int feature, const SurfacePoint& surface,
                                const std::array<int, 3>& vertices, const Vec3& weights);
+    /// Calls find(begin, end, list) for ranges of 0 ... count-1, and then use(found) for all that these have appended,
+    /// in their order.
+    template <class Found>
+    static void collect(WorkerTeam* team, int count, std::vector<std::vector<Found>>& lists, const auto& find,
+                        const auto& use);
     void markOutside(const Query& query, const ConvexPiece& piece);
     void findVertices(Query& query, const ConvexPiece& piece);
     void findFaces(Query& query, const ConvexPiece& piece);
@@ -52,6 +59,7 @@ class ShellContacts final : public ContactDetector {
     std::span<const std::pair<int, int>> m_pairs;
     std::pmr::vector<Frame> m_start;  ///< of the obstacles: pose that motions are counted from
     Memory& m_memory;
+    WorkerTeam* m_team;
     /// What the user made of a contact when it was first found in this step.
     struct Material {
         double friction, restitution;
@@ -74,7 +82,14 @@ class ShellContacts::Memory {
         int vertex;
         SurfacePoint surface;
     };
+    struct Face {
+        int triangle;
+        TrianglePoint touch;
+    };
     std::pmr::unsynchronized_pool_resource pool;
+    /// What ranges of vertices and triangles have found, one list each where threads share the search.
+    std::vector<std::vector<Candidate>> foundVertices;
+    std::vector<std::vector<Face>> foundFaces;
     std::vector<unsigned char> outside;  ///< per vertex: which sides of the obstacle's box it lies beyond
     std::vector<Candidate> candidates;
     std::vector<SurfacePoint> kept;  ///< of one vertex

@@ -305,7 +305,7 @@ void ShellWorld::solveIsland(Island& island, double h) {
     std::pmr::vector<CoupledBody> coupled(&m_impl->memory);
     coupled.reserve(island.obstacles.size());
     for (const Obstacle& obstacle : island.obstacles) coupled.push_back(obstacle.body);
-    ShellContacts contacts(bodies, island.obstacles, island.pairs, m_impl->contactMemory);
+    ShellContacts contacts(bodies, island.obstacles, island.pairs, m_impl->contactMemory, m_impl->team.get());
     TimedDetector timed(contacts, m_report.secondsContact);
     const Vec3 gravity = fromBullet(m_world.getGravity());
     IslandInput input;

@@ -7,8 +7,10 @@
 #include <BulletCollision/Gimpact/btGImpactShape.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <functional>
+#include <thread>
 
 #include "support/HardScenes.h"
 
@@ -338,7 +340,7 @@ TEST(Compound, AnEmptyShapeIsNothing) {
 }
 
 /// Ball of a multi-sphere shape, and the same ball as a user's own shape.
-class UserBall final : public btConvexInternalShape {
+class UserBall : public btConvexInternalShape {
   public:
     explicit UserBall(btScalar radius) : m_radius(radius) { m_shapeType = CUSTOM_CONVEX_SHAPE_TYPE; }
     btVector3 localGetSupportingVertexWithoutMargin(const btVector3& v) const override {
@@ -403,6 +405,65 @@ TEST(GImpact, AMovingBodyIsCaughtByASheet) {
         ASSERT_TRUE(scene.shells->lastStep().finite);
     }
     EXPECT_GT(sheet.contacts().size(), 0u);
+}
+
+// ----------------------------------------------------------------------------------------------------------- threads
+
+/// A user's own ball that notes whether another thread than its maker's asks it.
+class BallOfOneThread final : public UserBall {
+  public:
+    using UserBall::UserBall;
+    btVector3 localGetSupportingVertexWithoutMargin(const btVector3& v) const override {
+        if (std::this_thread::get_id() != m_thread) m_isAskedByOthers = true;
+        return UserBall::localGetSupportingVertexWithoutMargin(v);
+    }
+    bool isAskedByOthers() const { return m_isAskedByOthers; }
+
+  private:
+    std::thread::id m_thread = std::this_thread::get_id();
+    mutable std::atomic<bool> m_isAskedByOthers{false};
+};
+
+/// A sheet on a floor, with a box of two parts and a user's ball under it: what it touches at the end of some steps,
+/// and where it is.
+void lieOnMany(const FloorKind& kind, int threads, std::vector<ContactImpulse>& contacts, Points& end) {
+    Floor floor;
+    kind.make(floor);
+    btBoxShape box(btVector3(btScalar(0.1), btScalar(0.1), btScalar(0.1)));
+    btSphereShape sphere(btScalar(0.1));
+    auto compound = std::make_unique<btCompoundShape>();
+    compound->addChildShape(btTransform(btQuaternion::getIdentity(), btVector3(btScalar(0.06), 0, 0)), &box);
+    compound->addChildShape(btTransform(btQuaternion::getIdentity(), btVector3(btScalar(-0.06), 0, 0)), &sphere);
+    auto ball = std::make_unique<BallOfOneThread>(btScalar(0.1));
+    const BallOfOneThread& asked = *ball;
+    BulletScene scene;
+    scene.shells->setThreads(threads);
+    scene.addBody(std::move(floor.shape), 0, btVector3(0, 0, 0));
+    scene.addBody(std::move(compound), 0, btVector3(btScalar(0.2), btScalar(-0.05), btScalar(0.2)));
+    scene.addBody(std::move(ball), 0, btVector3(btScalar(-0.2), btScalar(-0.05), btScalar(-0.2)));
+    auto& sheet = scene.shells->add(squareSheet(1, 40), trampolineCloth());  // large enough to be shared
+    place(sheet, {0.013, 0.06, 0.017});
+    scene.run(0.1, kShortStep);
+    contacts.assign(sheet.contacts().begin(), sheet.contacts().end());
+    end = sheet.shell().positions();
+    EXPECT_FALSE(asked.isAskedByOthers());
+}
+
+TEST_P(Floors, AreFoundByThreadsInTheSameOrderAndToTheSameBits) {
+    std::vector<ContactImpulse> alone, together;
+    Points endAlone, endTogether;
+    lieOnMany(GetParam(), 1, alone, endAlone);
+    EXPECT_GT(alone.size(), 100u);
+    for (const int threads : {2, 4}) {
+        lieOnMany(GetParam(), threads, together, endTogether);
+        EXPECT_TRUE((endTogether.array() == endAlone.array()).all()) << threads;
+        ASSERT_EQ(together.size(), alone.size());
+        for (std::size_t i = 0; i < alone.size(); ++i) {
+            EXPECT_EQ(together[i].contact.feature, alone[i].contact.feature);
+            EXPECT_EQ(together[i].contact.body, alone[i].contact.body);
+            EXPECT_EQ(together[i].impulse, alone[i].impulse);
+        }
+    }
 }
 
 }  // namespace
