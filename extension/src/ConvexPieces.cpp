@@ -9,6 +9,7 @@
 #include <BulletCollision/CollisionShapes/btConvex2dShape.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
+#include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/CollisionShapes/btMinkowskiSumShape.h>
 #include <BulletCollision/CollisionShapes/btSdfCollisionShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
@@ -376,10 +377,42 @@ std::vector<std::unique_ptr<ConvexPiece>> makeConvexPieces(const btCollisionShap
     return pieces;
 }
 
+namespace {
+
+class EdgeLengths final : public btTriangleCallback {
+  public:
+    void processTriangle(btVector3* corners, int, int) override {
+        for (int i = 0; i < 3; ++i) m_sum += double(corners[i].distance(corners[(i + 1) % 3]));
+        m_count += 3;
+    }
+    double mean() const { return m_count > 0 ? m_sum / double(m_count) : std::numeric_limits<double>::infinity(); }
+
+  private:
+    double m_sum = 0.0;
+    long m_count = 0;
+};
+
+/// A heightfield, of which there may be millions, is asked for its scaling only: it has a point in each unit.
+double grainOf(const btConcaveShape& shape) {
+    if (shape.getShapeType() == CUSTOM_CONCAVE_SHAPE_TYPE) return std::numeric_limits<double>::infinity();
+    if (shape.getShapeType() == TERRAIN_SHAPE_PROXYTYPE) {
+        const int up = as<btHeightfieldTerrainShape>(shape).getUpAxis();
+        const btVector3& unit = shape.getLocalScaling();
+        return 0.5 * double(btFabs(unit[(up + 1) % 3]) + btFabs(unit[(up + 2) % 3]));
+    }
+    btVector3 lower, upper;
+    shape.getAabb(btTransform::getIdentity(), lower, upper);
+    EdgeLengths lengths;
+    shape.processAllTriangles(&lengths, lower, upper);
+    return lengths.mean();
+}
+
+}  // namespace
+
 std::vector<ConcavePiece> concavePieces(const btCollisionShape& shape) {
     std::vector<ConcavePiece> pieces;
     forEachPart(shape, Frame::Identity(), [&](const btCollisionShape& part, const Frame& frame) {
-        if (hasTriangles(part)) pieces.push_back({&as<btConcaveShape>(part), frame});
+        if (hasTriangles(part)) pieces.push_back({&as<btConcaveShape>(part), frame, grainOf(as<btConcaveShape>(part))});
     });
     return pieces;
 }

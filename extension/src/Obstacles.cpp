@@ -71,7 +71,7 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContact
     coupled.key = &object;
     for (const auto& piece : obstacle.shape->pieces)
         coupled.inner = std::min(coupled.inner, 0.5 * (piece->upper() - piece->lower()).minCoeff());
-    if (!object.isStaticOrKinematicObject())  // sheets that fly against what stands are seen from the start
+    if (!object.isStaticOrKinematicObject())
         for (const ConcavePiece& piece : obstacle.shape->concave)
             coupled.inner = std::min(coupled.inner, innerRadiusOf(*piece.shape));
     const btRigidBody* rigid = btRigidBody::upcast(&object);
@@ -96,6 +96,9 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContact
         if (moves && contacts) contacts->addSupports(*rigid, hasMoved ? 0.0 : h, coupled, freeSupports());
     }
     coupled.position = obstacle.start.translation();
+    // Of ground the place nearest to a vertex is where it comes down if it moves by less than a triangle.
+    if (object.isStaticOrKinematicObject() && coupled.freeTwist.isZero(0.0))
+        for (const ConcavePiece& piece : obstacle.shape->concave) coupled.inner = std::min(coupled.inner, piece.grain);
     return obstacle;
 }
 

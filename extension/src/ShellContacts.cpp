@@ -204,6 +204,15 @@ void ShellContacts::findFaces(Query& query, const ConvexPiece& piece) {
             [&](const Memory::Face& found) { addFace(query, found.triangle, found.touch); });
 }
 
+/// Makes a patch of all triangles in `near`, and by `margin` around it, unless it has them.
+void ShellContacts::cover(std::unique_ptr<TrianglePatch>& patch, const ConcavePiece& piece, Bounds near,
+                          double margin) {
+    if (patch && patch->box().contains(near)) return;
+    near.lower.array() -= margin;
+    near.upper.array() += margin;
+    patch = std::make_unique<TrianglePatch>(*piece.shape, near);
+}
+
 /// The triangles near the shell; the old ones if they still hold all of them. Bullet's shape is asked about once a
 /// step.
 void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::unique_ptr<TrianglePatch>& patch) {
@@ -215,12 +224,8 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
     if (depth == 0.0) depth = std::max(query.vertexReach, 0.5 * query.shellBody.shell().meanEdge());
     const Points x = (piece.frame.inverse(Eigen::Isometry) * query.frame.inverse(Eigen::Isometry)) * query.x;
     const double margin = std::max({reach, query.wantsFaces() ? faceReach : 0.0, depth});
-    Bounds near{x.rowwise().minCoeff().array() - margin, x.rowwise().maxCoeff().array() + margin};
-    if (!patch || !patch->box().contains(near)) {
-        near.lower.array() -= margin;
-        near.upper.array() += margin;
-        patch = std::make_unique<TrianglePatch>(*piece.shape, near);
-    }
+    const Bounds near{x.rowwise().minCoeff().array() - margin, x.rowwise().maxCoeff().array() + margin};
+    cover(patch, piece, near, margin);
     const auto place = [&](const SurfacePoint& s) -> SurfacePoint {
         return {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance};
     };

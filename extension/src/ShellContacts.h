@@ -46,6 +46,8 @@ class ShellContacts final : public ContactDetector {
     void markOutside(const Query& query, const ConvexPiece& piece);
     void findVertices(Query& query, const ConvexPiece& piece);
     void findFaces(Query& query, const ConvexPiece& piece);
+    static void cover(std::unique_ptr<TrianglePatch>& patch, const ConcavePiece& piece, Bounds near, double margin);
+    const TrianglePatch& patchOf(int pair, std::size_t concave, const Sweep& sweep);
     void findConcave(Query& query, const ConcavePiece& piece, std::unique_ptr<TrianglePatch>& patch);
     void addFace(Query& query, int triangle, const TrianglePoint& touch);
     void addVertices(Query& query);

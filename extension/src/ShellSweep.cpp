@@ -218,8 +218,22 @@ const TrianglePatch& ShellContacts::wholeOf(const ConcavePiece& piece, double ra
         .first->second;
 }
 
+/// What is swept against: of a body that stands, the triangles where the shell goes.
+const TrianglePatch& ShellContacts::patchOf(int pair, std::size_t concave, const Sweep& sweep) {
+    const ConcavePiece& piece = sweep.obstacle.shape->concave[concave];
+    if (!sweep.twist.isZero(0.0)) return wholeOf(piece, sweep.obstacle.body.radius);
+    const Frame toPiece = piece.frame.inverse(Eigen::Isometry) * sweep.bodyStart.inverse(Eigen::Isometry);
+    const Points start = toPiece * sweep.start, end = toPiece * sweep.end;
+    const double margin = sweep.shell.shell().meanEdge() + sweep.shell.contactThickness();
+    const Bounds near{start.rowwise().minCoeff().cwiseMin(end.rowwise().minCoeff()).array() - margin,
+                      start.rowwise().maxCoeff().cwiseMax(end.rowwise().maxCoeff()).array() + margin};
+    cover(m_patches[pair][concave], piece, near, margin);
+    return *m_patches[pair][concave];
+}
+
 void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& contacts) {
-    for (const auto& [shell, body] : m_pairs) {
+    for (int pair = 0; pair < int(m_pairs.size()); ++pair) {
+        const auto [shell, body] = m_pairs[pair];
         if (!motion.fast[body]) continue;
         const Obstacle& obstacle = m_obstacles[body];
         const Sweep sweep{*m_shells[shell], *motion.start[shell], *motion.end[shell], obstacle,
@@ -227,8 +241,9 @@ void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& cont
         const auto first = static_cast<std::ptrdiff_t>(contacts.size());
         m_byFeature.clear();
         for (const auto& piece : obstacle.shape->pieces) sweepPiece(sweep, ConvexTarget(*piece), contacts);
-        for (const ConcavePiece& piece : obstacle.shape->concave)
-            sweepPiece(sweep, ConcaveTarget(wholeOf(piece, obstacle.body.radius), piece.frame, obstacle.body.inner),
+        for (std::size_t k = 0; k < obstacle.shape->concave.size(); ++k)
+            sweepPiece(sweep,
+                       ConcaveTarget(patchOf(pair, k, sweep), obstacle.shape->concave[k].frame, obstacle.body.inner),
                        contacts);
         std::for_each(contacts.begin() + first, contacts.end(), [&, shell = shell, body = body](Contact& contact) {
             contact.shell = shell;

@@ -129,6 +129,19 @@ void shelf(double thick, int starts) {
 }
 
 /// After 10 s that it has to come to rest.
+void flungAtHill(double speed, double h, int starts) {
+    HillScene::Impact worst;
+    for (int i = 0; i < starts; ++i)
+        for (const int cells : {16, 32}) {
+            const HillScene::Impact impact = HillScene(0.04 * i / starts, cells).fling(speed, h);
+            worst.deepest = std::max(worst.deepest, impact.deepest);
+            worst.mostEnergy = std::max(worst.mostEnergy, impact.mostEnergy);
+        }
+    std::printf("cloth at %g m/s on a hill, 1/%.0f s: most energy %.2f of the start's, vertices %.1f mm deep at most\n",
+                speed, 1.0 / h, worst.mostEnergy, 1e3 * worst.deepest);
+    std::fflush(stdout);
+}
+
 void ballAtRest(int cells, int steps) {
     RestingBall resting(cells);
     const Vec3 start = resting.position();
@@ -154,6 +167,8 @@ void runAll(int starts) {
     for (const char* shape : {"ball", "rod", "box", "mesh"})
         for (const double speed : {1.5, 3.0, 5.0, 15.0, 60.0}) missiles(shape, speed, starts);
     for (const double thick : {0.01, 0.015, 0.02, 0.025}) shelf(thick, starts);
+    for (const double speed : {2.0, 5.0, 10.0, 20.0})
+        for (const double h : {1.0 / 60, 1.0 / 120}) flungAtHill(speed, h, std::max(1, starts / 5));
     for (const int cells : {11, 12, 16, 24}) ballAtRest(cells, 500 * starts);
 }
 

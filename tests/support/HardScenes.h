@@ -81,6 +81,11 @@ class Hill {
                           : h(1, 1) + (1 - a) * (h(0, 1) - h(1, 1)) + (1 - b) * (h(1, 0) - h(1, 1));
     }
 
+    /// The same, none beyond its border.
+    double groundAt(double x, double z) const {
+        return std::max(std::abs(x), std::abs(z)) < kHalf ? height(x, z) : -std::numeric_limits<double>::infinity();
+    }
+
   private:
     static constexpr int n = 41;
     static constexpr double kCell = 0.04, kHalf = 0.8;
@@ -89,9 +94,26 @@ class Hill {
 
 /// A cloth of 0.8 m falls on the hill, `aside` metres beside its place. The shape reads the hill, which goes last.
 struct HillScene : private Hill, BulletScene {
-    explicit HillScene(double aside) : sheet(shells->add(squareSheet(0.8, 16), trampolineCloth())) {
+    explicit HillScene(double aside, int cells = 16) : sheet(shells->add(squareSheet(0.8, cells), trampolineCloth())) {
         addBody(shape(), 0, btVector3(0, 0, 0));
         place(sheet, {0.01 + aside, 0.17, 0.02});
+    }
+    /// Flung at it: how far vertices get below the ground [m], and the most energy, of the start's.
+    struct Impact {
+        double deepest = 0.0, mostEnergy = 0.0;
+    };
+    Impact fling(double speed, double h) {
+        place(sheet, {0, 0.025 * speed, 0});
+        sheet.setVelocity(btVector3(0, btScalar(-speed), 0));
+        Impact impact;
+        const double start = energy(*this).total();
+        for (double t = 0.0; t < 0.8; t += h) {
+            step(h);
+            impact.deepest = std::max(impact.deepest,
+                                      -lowestClearance(sheet, [this](double x, double z) { return groundAt(x, z); }));
+            impact.mostEnergy = std::max(impact.mostEnergy, energy(*this).total() / start);
+        }
+        return impact;
     }
     /// Least height of a vertex above the ground while it drapes [m].
     double lowest() {
