@@ -23,8 +23,8 @@ std::vector<std::unique_ptr<ConvexPiece>> makeConvexPieces(const btCollisionShap
 struct ConcavePiece {
     const btConcaveShape* shape;
     Frame frame;
-    double
-        grain;  ///< mean length of its triangles' edges; infinite for shapes of the user's, which may have no end [m]
+    /// Mean length of its triangles' edges; infinite for shapes of the user's, which may have no end [m].
+    double grain;
 };
 
 /// The triangle meshes, scaled or of several materials, the heightfields, the GImpact meshes and the user's own concave

@@ -128,7 +128,7 @@ void shelf(double thick, int starts) {
         1e2 * thick, held, starts, silent, unsettled, solves);
 }
 
-/// After 10 s that it has to come to rest.
+/// Cloths of 80 cm, of 16 and 32 cells a side.
 void flungAtHill(double speed, double h, int starts) {
     HillScene::Impact worst;
     for (int i = 0; i < starts; ++i)
@@ -142,6 +142,7 @@ void flungAtHill(double speed, double h, int starts) {
     std::fflush(stdout);
 }
 
+/// After 10 s that it has to come to rest.
 void ballAtRest(int cells, int steps) {
     RestingBall resting(cells);
     const Vec3 start = resting.position();
