@@ -131,6 +131,15 @@ TYPED_TEST(StencilModelTest, BothKindsOfEvaluationAgreeOnEnergyAndGradient) {
     });
 }
 
+TYPED_TEST(StencilModelTest, EnergyAloneIsThatOfTheEvaluation) {
+    forCases<TypeParam>([](const auto& model, const auto& rest, const auto&, const auto& x) {
+        if constexpr (requires { model.energy(x, rest); }) {
+            const double expected = exact(model, rest, x).energy;
+            EXPECT_NEAR(model.energy(x, rest), expected, 1e-12 * expected + 1e-300);
+        }
+    });
+}
+
 TYPED_TEST(StencilModelTest, PositiveHessianIsSymmetricAndPositiveSemiDefinite) {
     forCases<TypeParam>([](const auto& model, const auto& rest, const auto&, const auto& x) {
         const auto H = model.evaluate(x, rest, HessianKind::Positive).hessian;

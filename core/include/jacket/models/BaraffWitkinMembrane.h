@@ -91,7 +91,7 @@ struct BaraffWitkinMembrane {
         const Vec3 s1 = g1u * w.col(1) + g1v * w.col(0), s2 = g2u * w.col(1) + g2v * w.col(0);  // dc_s/dx1, dc_s/dx2
 
         StencilEval<3> result;
-        result.energy = u.energy + v.energy + 0.5 * kS * cS * cS;
+        result.energy = energyOf(w, r);
         result.gradient.col(1) = g1u * u.gradient + g1v * v.gradient + kS * cS * s1;
         result.gradient.col(2) = g2u * u.gradient + g2v * v.gradient + kS * cS * s2;
         result.gradient.col(0) = -result.gradient.col(1) - result.gradient.col(2);
@@ -105,6 +105,11 @@ struct BaraffWitkinMembrane {
         setTriangleMatrix(result.hessian, block(g1u, g1v, g1u, g1v, s1, s1), block(g1u, g1v, g2u, g2v, s1, s2),
                           block(g2u, g2v, g2u, g2v, s2, s2));
         return result;
+    }
+
+    template <class = void>
+    double energy(const Stencil<3>& x, const Rest& r) const {
+        return energyOf(deformation(x, r), r);
     }
 
     bool isDamped() const { return conditionDamping > 0.0; }
@@ -129,7 +134,6 @@ struct BaraffWitkinMembrane {
 
   private:
     struct Stretch {
-        double energy;
         Vec3 gradient;  ///< by w
         Mat3 hessian;   ///< by w
     };
@@ -145,7 +149,13 @@ struct BaraffWitkinMembrane {
         return a * r.inverseFrame.row(0) + b * r.inverseFrame.row(1);
     }
 
-    /// 1/2 k (|w| - b)^2
+    template <class = void>
+    double energyOf(const Eigen::Matrix<double, 3, 2>& w, const Rest& r) const {
+        const double cU = safeLength(w.col(0)) - bU, cV = safeLength(w.col(1)) - bV, cS = w.col(0).dot(w.col(1));
+        return 0.5 * r.weight * (*stretchU * cU * cU + *stretchV * cV * cV + *shear * cS * cS);
+    }
+
+    /// Derivatives of 1/2 k (|w| - b)^2.
     template <class = void>
     static Stretch stretch(const Vec3& w, double k, double b, HessianKind kind) {
         const double length = safeLength(w), c = length - b;
@@ -153,7 +163,7 @@ struct BaraffWitkinMembrane {
         const double across = kind == HessianKind::Exact ? c / length : std::max(0.0, c / length);  // 1 - b/|w|
         Mat3 hessian = k * (1.0 - across) * direction * direction.transpose();
         hessian.diagonal().array() += k * across;
-        return {.energy = 0.5 * k * c * c, .gradient = k * c * direction, .hessian = hessian};
+        return {.gradient = k * c * direction, .hessian = hessian};
     }
 };
 static_assert(DampedStencilModel<BaraffWitkinMembrane>);

@@ -128,6 +128,12 @@ struct CubicShellBending {
         return result;
     }
 
+    template <class = void>
+    double energy(const Stencil<4>& x, const Rest& r) const {
+        if (r.folded) return DihedralBending{stiffness}.energy(x, r.dihedral);
+        return energyOf(x.rightCols<3>().colwise() - x.col(0), r);
+    }
+
     /// As DihedralBending; the polynomial is set up again for the hinge folded to its new angle.
     template <class = void>
     bool flow(const Stencil<4>& x, double area, const YieldRule& rule, Rest& r, double& accumulated) const {

@@ -162,7 +162,9 @@ struct DihedralBending {
     }
 
     /// The same angle in [-pi, pi].
-    static double wrapped(double angle) { return std::remainder(angle, 2.0 * std::numbers::pi); }
+    static double wrapped(double angle) {
+        return std::abs(angle) <= std::numbers::pi ? angle : std::remainder(angle, 2.0 * std::numbers::pi);
+    }
 };
 static_assert(StencilModel<DihedralBending> && PlasticStencilModel<DihedralBending>);
 

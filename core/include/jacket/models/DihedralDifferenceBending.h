@@ -61,6 +61,11 @@ struct DihedralDifferenceBending {
             }
         return result;
     }
+
+    template <class = void>
+    double energy(const Stencil<4>& x, const Rest& r) const {
+        return DihedralBending{stiffness}.energy(x, r);
+    }
 };
 static_assert(StencilModel<DihedralDifferenceBending>);
 

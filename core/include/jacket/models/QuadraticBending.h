@@ -44,12 +44,16 @@ struct QuadraticBending {
 
     template <class = void>
     StencilEval<4> evaluate(const Stencil<4>& x, const Rest& r, HessianKind) const {
-        const Stencil<3> fromX0 = x.rightCols<3>().colwise() - x.col(0);  // loses no digits far from the origin
-        const Vec3 l = fromX0 * r.cotangents.tail<3>();
+        const Vec3 l = bend(x, r);
         const Vec4 weighted = r.weight * r.cotangents;
         return {.energy = 0.5 * r.weight * l.squaredNorm(),
                 .gradient = l * weighted.transpose(),
                 .hessian = timesIdentity3<4>(weighted * r.cotangents.transpose())};
+    }
+
+    template <class = void>
+    double energy(const Stencil<4>& x, const Rest& r) const {
+        return 0.5 * r.weight * bend(x, r).squaredNorm();
     }
 
     /// c, from the angles between the edges x0 x1 and those that leave it.
@@ -59,6 +63,14 @@ struct QuadraticBending {
         const double at0In0 = cotangent(x0, x1, x2), at1In0 = cotangent(x1, x0, x2);  // in triangle (x0 x1 x2)
         const double at0In1 = cotangent(x0, x1, x3), at1In1 = cotangent(x1, x0, x3);  // in triangle (x1 x0 x3)
         return {at1In0 + at1In1, at0In0 + at0In1, -at0In0 - at1In0, -at0In1 - at1In1};
+    }
+
+  private:
+    /// l [m]
+    template <class = void>
+    static Vec3 bend(const Stencil<4>& x, const Rest& r) {
+        const Stencil<3> fromX0 = x.rightCols<3>().colwise() - x.col(0);  // loses no digits far from the origin
+        return fromX0 * r.cotangents.tail<3>();
     }
 };
 static_assert(StencilModel<QuadraticBending>);

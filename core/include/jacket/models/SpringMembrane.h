@@ -72,6 +72,12 @@ struct SpringMembrane {
         result.hessian << block, -block, -block, block;
         return result;
     }
+
+    template <class = void>
+    double energy(const Stencil<2>& x, const Rest& r) const {
+        const double elongation = std::max((x.col(0) - x.col(1)).norm(), 1e-9 * r.length) - r.length;
+        return elongation < 0.0 && !compression ? 0.0 : 0.5 * r.stiffness * elongation * elongation;
+    }
 };
 static_assert(StencilModel<SpringMembrane>);
 

@@ -35,7 +35,7 @@ enum class StencilSite {
 /// does, need not compile them.
 ///
 /// A model: parameters and formula of one energy. It holds no mesh and no loop; `Rest` is what it remembers per
-/// stencil.
+/// stencil. Where it has `energy(x, rest)` beside `evaluate`, checks of a step cost less.
 template <class Model>
 concept StencilModel = requires(const Model model, const Stencil<Model::kVertices> x, double area,
                                 const typename Model::Rest rest, const ShellMaterial material) {
