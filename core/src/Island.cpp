@@ -700,7 +700,7 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
     const bool isSingle = dynamicBodies.empty() && !isAnyFactored() &&
                           linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance && isIncomplete;
     system.begin(parts, static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(), supports.couplings(),
-                 isSingle ? Precision::Single : Precision::Double, isSingle ? team : nullptr);
+                 isSingle ? Precision::Single : Precision::Double, team);
     readFreeTwists();
     reference = -1.0;
     lap.addTo(times.assembly);

@@ -9,37 +9,84 @@
 namespace jacket {
 namespace {
 
-/// Scalars by rows, and what those beside the blocks are multiplied with, in fours.
+constexpr int kRowsAtATime = 512;  ///< that a thread of a team takes
+
+/// As plain memory. Blocks are nine numbers by columns; x is in fours, with a number before it that may be anything.
 template <class Column>
-struct ScalarRows {
-    ConstantHessian::Rows<Column> scalars;
+struct Operands {
+    const int *lowerStart, *lowerColumn, *upperStart, *upperRow, *upperSlot;
+    const double *diagonal, *lower;
+    ConstantHessian::Rows<Column> scalars;  ///< beside; null: none
+    double besideFactor;
     const double* x;
-    double factor;
-    int count;
 };
 
-/// y += factor K x, three numbers a row of y.
+/// Of a row: the first three places, the last three, and three sums that are still in parts.
+struct RowSum {
+    Double4 first{}, last{}, parts[3] = {};
+};
+
+JACKET_INLINE void load(const double* from, Double4& to) {
+    std::memcpy(&to, from, sizeof(to));
+}
+
+/// Adds block times x.
+JACKET_INLINE void addProduct(const double* block, const double* x, RowSum& sum) {
+    Double4 column;
+    load(block, column);
+    sum.first += column * x[0];
+    load(block + 3, column);
+    sum.first += column * x[1];
+    load(block + 5, column);  // from one place before: behind the block may be nothing
+    sum.last += column * x[2];
+}
+
+/// Adds the block's transpose times x.
+JACKET_INLINE void addTransposedProduct(const double* block, const double* x, RowSum& sum) {
+    Double4 column, inFirst, inLast;
+    load(x, inFirst);
+    load(x - 1, inLast);
+    load(block, column);
+    sum.parts[0] += column * inFirst;
+    load(block + 3, column);
+    sum.parts[1] += column * inFirst;
+    load(block + 5, column);
+    sum.parts[2] += column * inLast;
+}
+
 template <class Column>
-JACKET_KERNEL void addScalarRows(const ScalarRows<Column>& beside, double* y) {
-    const ScalarRows<Column> rows = beside;  // nobody writes there
-    const ConstantHessian::Rows<Column>& scalars = rows.scalars;
-    for (int i = 0; i < rows.count; ++i) {
-        Double4 even{}, odd{};  // two sums: shorter chains of additions
-        int k = scalars.start[i];
-        const int end = scalars.start[i + 1];
-        Double4 x;
-        for (; k + 1 < end; k += 2) {
-            std::memcpy(&x, rows.x + 4 * scalars.column[k], sizeof(x));
-            even += scalars.value[k] * x;
-            std::memcpy(&x, rows.x + 4 * scalars.column[k + 1], sizeof(x));
-            odd += scalars.value[k + 1] * x;
+JACKET_INLINE void addBeside(const Operands<Column>& o, int row, RowSum& sum) {
+    Double4 x, sums[2] = {};  // shorter chains of additions
+    int k = o.scalars.start[row];
+    const int end = o.scalars.start[row + 1];
+    for (; k + 1 < end; k += 2)
+        for (int i = 0; i < 2; ++i) {
+            load(o.x + 4 * o.scalars.column[k + i], x);
+            sums[i] += o.scalars.value[k + i] * x;
         }
-        if (k < end) {
-            std::memcpy(&x, rows.x + 4 * scalars.column[k], sizeof(x));
-            even += scalars.value[k] * x;
-        }
-        even = rows.factor * (even + odd);
-        for (int c = 0; c < 3; ++c) y[3 * i + c] += even[c];
+    if (k < end) {
+        load(o.x + 4 * o.scalars.column[k], x);
+        sums[0] += o.scalars.value[k] * x;
+    }
+    sum.first += o.besideFactor * (sums[0] + sums[1]);
+}
+
+/// Rows begin to end - 1 of y, three numbers each.
+template <class Column>
+JACKET_KERNEL void multiplyKernel(const Operands<Column>& operands, int begin, int end, double* y) {
+    const Operands<Column> o = operands;  // nobody writes there
+    for (int i = begin; i < end; ++i) {
+        RowSum sum;
+        addProduct(o.diagonal + 9 * i, o.x + 4 * i, sum);
+        for (int k = o.lowerStart[i]; k < o.lowerStart[i + 1]; ++k)
+            addProduct(o.lower + 9 * k, o.x + 4 * o.lowerColumn[k], sum);
+        for (int k = o.upperStart[i]; k < o.upperStart[i + 1]; ++k)
+            addTransposedProduct(o.lower + 9 * o.upperSlot[k], o.x + 4 * o.upperRow[k], sum);
+        if (o.scalars.value) addBeside(o, i, sum);
+        const Double4* const p = sum.parts;
+        y[3 * i] = sum.first[0] + sum.last[1] + (p[0][0] + p[0][1] + p[0][2]);
+        y[3 * i + 1] = sum.first[1] + sum.last[2] + (p[1][0] + p[1][1] + p[1][2]);
+        y[3 * i + 2] = sum.first[2] + sum.last[3] + (p[2][1] + p[2][2] + p[2][3]);
     }
 }
 
@@ -73,6 +120,22 @@ void BlockMatrix::setPattern(int size, std::vector<std::pair<int, int>> pairs) {
     m_diagonal.assign(size, Mat3::Zero());
     m_lower.assign(pairs.size(), Mat3::Zero());
     m_compact.reset();
+    findUpper();
+}
+
+void BlockMatrix::findUpper() {
+    m_upperStart.assign(size() + 1, 0);
+    m_upperRow.resize(m_column.size());
+    m_upperSlot.resize(m_column.size());
+    for (const int column : m_column) ++m_upperStart[column + 1];
+    for (int i = 0; i < size(); ++i) m_upperStart[i + 1] += m_upperStart[i];
+    std::vector<int> next(m_upperStart.begin(), m_upperStart.end() - 1);
+    for (int i = 0; i < size(); ++i)
+        for (int k = rowBegin(i); k < rowEnd(i); ++k) {
+            const int place = next[m_column[k]]++;
+            m_upperRow[place] = i;
+            m_upperSlot[place] = k;
+        }
 }
 
 int BlockMatrix::slot(int row, int column) const {
@@ -102,37 +165,38 @@ void BlockMatrix::setZero() {
     std::fill(m_lower.begin(), m_lower.end(), Mat3::Zero());
 }
 
-void BlockMatrix::multiply(const double* x, double* y) const {
-    const int n = size();
-    for (int i = 0; i < n; ++i) {
-        const double x0 = x[3 * i], x1 = x[3 * i + 1], x2 = x[3 * i + 2];
-        const double* d = m_diagonal[i].data();
-        double y0 = d[0] * x0 + d[3] * x1 + d[6] * x2;
-        double y1 = d[1] * x0 + d[4] * x1 + d[7] * x2;
-        double y2 = d[2] * x0 + d[5] * x1 + d[8] * x2;
-        for (int k = m_rowStart[i]; k < m_rowStart[i + 1]; ++k) {
-            const double* a = m_lower[k].data();  // column major
-            const double* xj = x + 3 * m_column[k];
-            double* yj = y + 3 * m_column[k];  // an earlier row: already written
-            y0 += a[0] * xj[0] + a[3] * xj[1] + a[6] * xj[2];
-            y1 += a[1] * xj[0] + a[4] * xj[1] + a[7] * xj[2];
-            y2 += a[2] * xj[0] + a[5] * xj[1] + a[8] * xj[2];
-            yj[0] += a[0] * x0 + a[1] * x1 + a[2] * x2;
-            yj[1] += a[3] * x0 + a[4] * x1 + a[5] * x2;
-            yj[2] += a[6] * x0 + a[7] * x1 + a[8] * x2;
-        }
-        y[3 * i] = y0;
-        y[3 * i + 1] = y1;
-        y[3 * i + 2] = y2;
-    }
-    if (m_beside) addBeside(x, y);
+void BlockMatrix::multiply(const double* x, double* y, WorkerTeam* team) const {
+    double* const inFours = padded();
+    runRanges(team, size(), kRowsAtATime, [&](int begin, int end) {
+        for (int i = begin; i < end; ++i) std::copy_n(x + 3 * i, 3, inFours + 4 * i);
+    });
+    const auto multiplyWith = [&](const auto& scalars) {
+        const Operands operands{m_rowStart.data(),
+                                m_column.data(),
+                                m_upperStart.data(),
+                                m_upperRow.data(),
+                                m_upperSlot.data(),
+                                m_diagonal.data()->data(),
+                                m_lower.empty() ? nullptr : m_lower.data()->data(),
+                                scalars,
+                                m_besideFactor,
+                                inFours};
+        runRanges(team, size(), kRowsAtATime, [&](int begin, int end) { multiplyKernel(operands, begin, end, y); });
+    };
+    if (!m_beside) return multiplyWith(ConstantHessian::Rows<int>{});
+    m_beside->visit([&](const auto&, const auto& scalars) { multiplyWith(scalars); });
 }
 
-void BlockMatrix::addBeside(const double* x, double* y) const {
-    double* const inFours = padded();
-    for (int i = 0; i < size(); ++i) std::copy_n(x + 3 * i, 3, inFours + 4 * i);
+void BlockMatrix::addColumn(int vertex, const Vec3& change, double* y) const {
+    const auto add = [&](int row, const Vec3& by) { Eigen::Map<Vec3>(y + 3 * row) += by; };
+    add(vertex, m_diagonal[vertex] * change);
+    for (int k = rowBegin(vertex); k < rowEnd(vertex); ++k) add(m_column[k], m_lower[k].transpose() * change);
+    for (int k = m_upperStart[vertex]; k < m_upperStart[vertex + 1]; ++k)
+        add(m_upperRow[k], m_lower[m_upperSlot[k]] * change);
+    if (!m_beside) return;
     m_beside->visit([&](const auto&, const auto& scalars) {
-        addScalarRows(ScalarRows{scalars, inFours, m_besideFactor, size()}, y);
+        for (int k = scalars.start[vertex]; k < scalars.start[vertex + 1]; ++k)  // symmetric: a row is a column
+            add(scalars.column[k], m_besideFactor * scalars.value[k] * change);
     });
 }
 

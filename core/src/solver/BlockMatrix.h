@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "jacket/Types.h"
+#include "jacket/WorkerTeam.h"
 #include "solver/ConstantHessian.h"
 
 namespace jacket {
@@ -48,13 +49,17 @@ class BlockMatrix {
     const ConstantHessian* beside() const { return m_beside; }
     double besideFactor() const { return m_besideFactor; }
 
-    /// y = A x over `size()` columns starting at x and y (3 doubles each). They must not overlap.
-    void multiply(const double* x, double* y) const;
+    /// y = A x over `size()` columns starting at x and y (3 doubles each). They must not overlap. Row by row, so that
+    /// threads can share it: each block is read for its row and once more for its column.
+    void multiply(const double* x, double* y, WorkerTeam* team = nullptr) const;
+    /// y += A e, e being `change` at one vertex and 0 at all others.
+    void addColumn(int vertex, const Vec3& change, double* y) const;
 
-    /// Memory for a vector in fours, for the machine's sake, which the next product takes too. The last ones are 0.
+    /// Memory for a vector in fours, for the machine's sake, which the next product takes too. The last ones are 0, and
+    /// before it are more numbers.
     double* padded() const {
-        m_padded.resize(4 * m_diagonal.size());
-        return m_padded.data();
+        m_padded.resize(4 * (m_diagonal.size() + 1));
+        return m_padded.data() + 4;
     }
 
     /// Place for the copy in single precision that solves work with, and what they keep of it. Made with the pattern
@@ -62,8 +67,9 @@ class BlockMatrix {
     CompactShell& compact() const;
 
   private:
-    void addBeside(const double* x, double* y) const;
+    void findUpper();
     std::vector<int> m_rowStart, m_column;
+    std::vector<int> m_upperStart, m_upperRow, m_upperSlot;  ///< of each column: rows, and indices in lower()
     std::vector<Mat3> m_diagonal, m_lower;
     const ConstantHessian* m_beside = nullptr;
     double m_besideFactor = 0.0;

@@ -1,7 +1,6 @@
 #pragma once
 #include <memory>
 
-#include "solver/BlockProduct.h"
 #include "solver/CoarseSpace.h"
 #include "solver/CompactFactor.h"
 #include "solver/CompactMatrix.h"
@@ -10,12 +9,11 @@ namespace jacket {
 
 /// What solves in single precision keep of one shell from step to step.
 struct CompactShell {
-    BlockProduct product;
     CompactMatrix matrix;
     CompactFactor factor;
     std::unique_ptr<CoarseSpace> coarse;  ///< of shells that are large enough
 
-    explicit CompactShell(const BlockMatrix& blocks) : product(blocks), matrix(blocks), factor(matrix) {}
+    explicit CompactShell(const BlockMatrix& blocks) : matrix(blocks), factor(matrix) {}
     CompactShell(const CompactShell&) = delete;  // the factor refers to the matrix
 
     /// z = P^-1 r, four floats a row. The coarse problem, which has no parts, is solved beside the factor's.

@@ -251,18 +251,27 @@ void CoupledPreconditioner::factorGroup(const CoupledSystem& system, int first, 
 }
 
 /// In single precision what is computed with in double: iterations need to know P no better.
-void CoupledPreconditioner::applyCompact(const CoupledSystem::ShellPart& part, const Points& r, Points& z) const {
+void CoupledPreconditioner::applyCompact(const CoupledSystem::ShellPart& part, const Points& r, Points& z,
+                                         WorkerTeam* team) const {
+    constexpr int kRowsAtATime = 1024;
     const CompactShell& compact = part.matrix->compact();
     const std::vector<int>& vertexOf = compact.matrix.vertexOf();
+    const int count = static_cast<int>(vertexOf.size());
     m_rounded.resize(4 * vertexOf.size());
     m_roundedZ.resize(4 * vertexOf.size());
-    for (std::size_t row = 0; row < vertexOf.size(); ++row)
-        Eigen::Map<Eigen::Vector4f>(m_rounded.data() + 4 * row) << r.col(part.offset + vertexOf[row]).cast<float>(),
-            0.0f;
-    compact.precondition(m_rounded.data(), m_roundedZ.data(), nullptr);
-    for (std::size_t row = 0; row < vertexOf.size(); ++row)
-        z.col(part.offset + vertexOf[row]) =
-            Eigen::Map<const Eigen::Vector3f>(m_roundedZ.data() + 4 * row).cast<double>();
+    const auto forRows = [&](const auto& visit) {
+        runRanges(team, count, kRowsAtATime, [&](int begin, int end) {
+            for (int row = begin; row < end; ++row)
+                visit(4 * static_cast<std::size_t>(row), part.offset + vertexOf[row]);
+        });
+    };
+    forRows([&](std::size_t at, int vertex) {
+        Eigen::Map<Eigen::Vector4f>(m_rounded.data() + at) << r.col(vertex).cast<float>(), 0.0f;
+    });
+    compact.precondition(m_rounded.data(), m_roundedZ.data(), team);
+    forRows([&](std::size_t at, int vertex) {
+        z.col(vertex) = Eigen::Map<const Eigen::Vector3f>(m_roundedZ.data() + at).cast<double>();
+    });
 }
 
 void CoupledPreconditioner::apply(const CoupledSystem& system, const CoupledVector& r, CoupledVector& z) const {
@@ -271,7 +280,7 @@ void CoupledPreconditioner::apply(const CoupledSystem& system, const CoupledVect
         if (m_complete[i]) {
             m_complete[i]->apply(r.s.data() + 3 * part.offset, z.s.data() + 3 * part.offset);
         } else if (isCompact(system, i)) {
-            applyCompact(part, r.s, z.s);
+            applyCompact(part, r.s, z.s, system.team());
         } else if (m_kind == Preconditioner::IncompleteCholesky) {
             m_factors[i].apply(r.s.data() + 3 * part.offset, z.s.data() + 3 * part.offset);
         } else {

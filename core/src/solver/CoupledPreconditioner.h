@@ -48,7 +48,7 @@ class CoupledPreconditioner {
     bool factorCompletely(const CoupledSystem& system, std::size_t shell);
     bool isCompact(const CoupledSystem& system, std::size_t shell) const;
     /// What the other apply does to a system in single precision, of one shell of a system in double.
-    void applyCompact(const CoupledSystem::ShellPart& part, const Points& r, Points& z) const;
+    void applyCompact(const CoupledSystem::ShellPart& part, const Points& r, Points& z, WorkerTeam* team) const;
     void findFree(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
     void buildCoarse(const CoupledSystem& system, const CoupledSystem::ShellPart& part);
     static bool knowsContacts(const CoupledSystem& system, const CoupledSystem::ShellPart& part,

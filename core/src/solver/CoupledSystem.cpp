@@ -92,14 +92,8 @@ Vec3 CoupledSystem::velocityOf(const CoupledVector& u, int vertex) const {
 }
 
 void CoupledSystem::multiply(const Points& v, Points& q) const {
-    for (const auto& shell : m_shells) {
-        const double* from = v.data() + 3 * shell.offset;
-        double* to = q.data() + 3 * shell.offset;
-        if (m_precision == Precision::Single)
-            shell.matrix->compact().product.multiply(*shell.matrix, from, to, m_team);
-        else
-            shell.matrix->multiply(from, to);
-    }
+    for (const auto& shell : m_shells)
+        shell.matrix->multiply(v.data() + 3 * shell.offset, q.data() + 3 * shell.offset, m_team);
 }
 
 /// v at u, and A v. Where few vertices move otherwise than they did the last time, only their part is computed anew.
@@ -112,7 +106,7 @@ void CoupledSystem::multiplyFromLast(const CoupledVector& u) const {
         if (velocity != m_v.col(i)) m_moved.push_back({i, velocity});
         isFew = kFew * static_cast<int>(m_moved.size()) <= m_vertexCount;
     }
-    m_isProductKnown = m_precision == Precision::Single;  // in double no columns are at hand
+    m_isProductKnown = m_precision == Precision::Single;  // in double iterations use m_v and m_q
     if (!isFew) {
         velocities(u, m_v);
         m_q.resize(3, m_vertexCount);
@@ -121,8 +115,7 @@ void CoupledSystem::multiplyFromLast(const CoupledVector& u) const {
     auto shell = m_shells.begin();
     for (const auto& [i, velocity] : m_moved) {
         while (i >= shell->offset + shell->matrix->size()) ++shell;
-        shell->matrix->compact().product.addColumn(*shell->matrix, i - shell->offset, velocity - m_v.col(i),
-                                                   m_q.data() + 3 * shell->offset);
+        shell->matrix->addColumn(i - shell->offset, velocity - m_v.col(i), m_q.data() + 3 * shell->offset);
         m_v.col(i) = velocity;
     }
 }

@@ -80,7 +80,7 @@ class StepSystem {
 
     /// The force -K (scale y) of an alteration. Only after every energy and before anything else has been added.
     void addAlteration(const Eigen::Ref<const Points>& y, double scale = 1.0) {
-        matrix.multiply(y.data(), scratch().data());  // (h^2 + h beta) K y
+        matrix.multiply(y.data(), scratch().data(), m_team);  // (h^2 + h beta) K y
         rhs -= (scale * m_h / m_stiffnessFactor) * m_scratch;
     }
 
