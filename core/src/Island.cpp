@@ -139,7 +139,7 @@ struct IslandSolver::Impl {
 
     void clearReport();
     void gather(const IslandInput& input);
-    void beginContacts(const IslandInput& input);
+    void beginContacts(const IslandInput& input, bool onlyStops = false);
     void beginTwoStep(const IslandInput& input, std::size_t shell);
     void assemble(const IslandInput& input, bool atEnd);
     /// Velocities that the step's momentum starts from (BDF2: not `start`).
@@ -156,8 +156,9 @@ struct IslandSolver::Impl {
     double energyGain(const IslandInput& input) const;
     double energyOfMotion(const IslandInput& input, std::size_t shell) const;
     bool bodiesLead(const IslandInput& input) const;
+    bool descend(const IslandInput& input, StepReport& report);
     void limitDeformation(const IslandInput& input, StepReport& report);
-    void limitPushes(const IslandInput& input);
+    void limitPushes(const IslandInput& input, double mostGain);
     double gainOfCoasting(const IslandInput& input);
     void blend(const IslandInput& input, const Points& other);
     void coast(const IslandInput& input, const Points& coasting);
@@ -302,8 +303,9 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
 }
 
 /// Those at the start of the step, and y.
-void IslandSolver::Impl::beginContacts(const IslandInput& input) {
-    response.begin(input, {offsets, dynamicIndex, stepOf, isAnyFactored(), givesWay, mayBeShorter}, expected, y);
+void IslandSolver::Impl::beginContacts(const IslandInput& input, bool onlyStops) {
+    response.begin(input, {offsets, dynamicIndex, stepOf, isAnyFactored(), givesWay, mayBeShorter, onlyStops}, expected,
+                   y);
     givesWay = givesWay || !response.hasContacts();
 }
 
@@ -358,7 +360,47 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
         solveRounds(input, report);
     }
     const double mostGain = response.hasFastBody() && bodiesLead(input) ? kMostGainOfFast : kMostEnergyGain;
-    if (unfiltered().allFinite() && energyGain(input) > partOfStep * mostGain) limitDeformation(input, report);
+    if (!unfiltered().allFinite()) return;
+    const bool isAmongWalls = dynamicBodies.empty() && !input.bodies.empty();
+    if (isAmongWalls && energyGain(input) > partOfStep * kEnergyGainAlone && descend(input, report)) return;
+    if (energyGain(input) > partOfStep * mostGain) limitDeformation(input, report);
+}
+
+/// Where Newton's method does not settle among walls: once more from standing still, which no contact forbids that only
+/// stops, and always downhill. So it gains no energy, wherever it ends. False if it did not come to that.
+bool IslandSolver::Impl::descend(const IslandInput& input, StepReport& report) {
+    constexpr int kMostSteps = 20, kMostHalvings = 20;
+    constexpr double kSettled = 1e-3;  // of what the first step brings
+    givesWay = false;
+    stepsInFull = 0;
+    gather(input);
+    beginContacts(input, true);
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        elasticAtStart[k] = input.shells[k]->elasticEnergy(input.shells[k]->positions());
+    limitPushes(input, kEnergyGain);
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        for (int i = 0; i < input.shells[k]->vertexCount(); ++i)
+            if (!input.shells[k]->isPinned(i)) v.col(offsets[k] + i).setZero();
+    double least = incrementalPotential(input, v), first = 0.0;
+    for (int step = 0; step < kMostSteps; ++step) {
+        newtonFrom = v;
+        assemble(input, true);
+        solveRounds(input, report);
+        if (!unfiltered().allFinite()) return false;
+        double now = incrementalPotential(input, v);
+        for (int i = 0; i < kMostHalvings && !(now < least); ++i) {
+            v = 0.5 * (v + newtonFrom);
+            now = incrementalPotential(input, v);
+        }
+        if (!(now < least)) v = newtonFrom;
+        const double gained = least - std::min(now, least);
+        least -= gained;
+        first = std::max(first, gained);
+        if (gained <= kSettled * first) break;
+    }
+    system.start(v, freeTwist, u);
+    report.limited = true;
+    return energyGain(input) <= partOfStep * kMostEnergyGain;
 }
 
 /// After one more Newton step: goes back along it until the incremental potential is not above what it was, and says
@@ -464,7 +506,7 @@ bool IslandSolver::Impl::overstretches(const IslandInput& input, bool isAgain) c
 void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& report) {
     constexpr int kMostHalvings = 40;
     report.limited = true;
-    limitPushes(input);
+    limitPushes(input, kMostEnergyGain);
     const double most = std::max(kEnergyGain, gainOfCoasting(input));
     rigid = v;
     makeRigid(input, rigid, input.h);
@@ -484,9 +526,9 @@ void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& 
     for (std::size_t b = 0; impulseShare < 1.0 && b < input.bodies.size(); ++b) response.forget(static_cast<int>(b));
 }
 
-/// What moves vertices out of bodies goes half way to a rigid motion until it no longer more than doubles the energy:
-/// their neighbours will not give way as they were to, and may turn with the shell.
-void IslandSolver::Impl::limitPushes(const IslandInput& input) {
+/// What moves vertices out of bodies goes half way to a rigid motion until it no longer gains more than that share of
+/// the energy: their neighbours will not give way as they were to, and may turn with the shell.
+void IslandSolver::Impl::limitPushes(const IslandInput& input, double mostGain) {
     constexpr int kMostHalvings = 40;
     reached = y;
     makeRigid(input, reached, 1.0);
@@ -494,7 +536,7 @@ void IslandSolver::Impl::limitPushes(const IslandInput& input) {
     makeRigid(input, rigid, input.h);
     double most = 0.0;
     for (std::size_t k = 0; k < input.shells.size(); ++k)
-        most += elasticAtStart[k] + partOfStep * kMostEnergyGain * (elasticAtStart[k] + energyOfMotion(input, k));
+        most += elasticAtStart[k] + partOfStep * mostGain * (elasticAtStart[k] + energyOfMotion(input, k));
     const auto energyAfter = [&] {
         double sum = 0.0;
         for (std::size_t k = 0; k < input.shells.size(); ++k) sum += elasticEnergyAfter(input, k, rigid);

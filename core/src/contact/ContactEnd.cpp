@@ -173,7 +173,7 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
         if (isSaidByVertex(contact)) return false;
         // Of features that share vertices the deepest comes first, for the others may be cured with it.
         m_deepestGap = std::min(m_deepestGap, lacks);
-        if (liftVertices(contact, -lacks, solved)) return true;
+        if (!m_onlyStops && liftVertices(contact, -lacks, solved)) return true;
         for (int a = 0; a < 3; ++a)
             if (contact.weights[a] > 0.0 && m_claimed.count(globalVertex(contact, a))) return true;
         for (int a = 0; a < 3; ++a)
@@ -207,9 +207,11 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
         touch.contact.gap = firstGap;
         touch.target = -std::max(firstGap, 0.0) / m_input.h;
     } else {
-        const double take = isBetweenBodies(touch) ? kAlteration * lacks : lacks;
+        const double speed = relativeVelocity(touch, solved).dot(contact.normal);
+        double take = isBetweenBodies(touch) ? kAlteration * lacks : lacks;
+        if (m_onlyStops) take = lacks - std::min(0.0, lacks - m_input.h * speed);
         touch.allowedGap += lacks - take;
-        touch.target = relativeVelocity(touch, solved).dot(contact.normal) - take / m_input.h;
+        touch.target = speed - take / m_input.h;
     }
     if (touch.bounces) touch.target = std::max(touch.target, leavingSpeed(touch));
     return true;

@@ -132,6 +132,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     m_frictionRounds = 0;
     m_mostFrictionRounds = m_memory.empty() ? kFrictionRounds : kFrictionRoundsGoingOn;
     m_anyFast = false;
+    m_onlyStops = numbering.onlyStops;
     m_held.assign(y.cols(), 0);
     m_filters.clear();
     m_filterOf.assign(y.cols(), -1);
@@ -149,7 +150,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
 
     const Care inFull = hasFreeBodies() ? kInFull : kAtLength;
     m_care = isAmongWalls() && !isAnyStiff() && numbering.givesWay ? kAmongWalls : inFull;
-    if (numbering.isAnyFactored) m_care = kAtLength;
+    if (numbering.isAnyFactored || m_onlyStops) m_care = kAtLength;
     m_creep = creepSpeed();
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);
     m_faceSlop = std::min(2e-4, 1e-2 * shortest);
@@ -206,6 +207,7 @@ void ContactResponse::addAtStart(const Contact& contact, Points& y) {
         const auto faces = m_room.find(globalVertex(contact, 0));
         const double most = faces == m_room.end() ? std::numeric_limits<double>::infinity() : faces->second;
         touch.offset = memory->offset - std::clamp((1.0 - kOffsetDecay) * memory->offset, 0.0, std::max(0.0, most));
+        if (m_onlyStops) touch.offset = std::clamp(contact.gap, 0.0, touch.offset);
     }
     touch.contact.gap -= touch.offset;
     touch.target = -std::max(touch.contact.gap, 0.0) / m_input.h;

@@ -37,6 +37,7 @@ class ContactResponse {
         bool isAnyFactored;                    ///< some shell: completely
         bool givesWay;                         ///< false: pushOut would strain some shell
         bool mayBeShorter;                     ///< the step, if fast contacts do not settle soon
+        bool onlyStops;  ///< solved velocities need only keep shells from going deeper than they are
     };
     /// Contacts at the start of the step, and the position alteration y of vertices that stand inside a body.
     /// `expected`: velocities at the end of the step as they would be if the last step's change went on; kept by
@@ -250,6 +251,7 @@ class ContactResponse {
     std::vector<Vec6> m_endTwists;  ///< of each body
     std::vector<char> m_fast;       ///< per body: may pass a shell within the step
     bool m_anyFast = false;
+    bool m_onlyStops = false;  ///< see Numbering
     std::vector<Contact> m_found;
     std::pmr::map<int, double> m_room{&m_pool};  ///< of vertices: see findRoomBesideFaces [m]
     std::pmr::map<int, Vec3> m_raised{
