@@ -48,6 +48,42 @@ TEST(Contact, PaperThatComesDownOnABallGainsNoEnergy) {
     }
 }
 
+/// Where a ball is nearest to a triangle beside a vertex that something else holds, the triangle bears it: a pin, or
+/// the floor under the sheet, keeps the vertex from being lifted.
+class BallBesideAVertex : public ::testing::TestWithParam<std::tuple<double, double>> {
+  protected:
+    /// Where it comes to rest: its lowest point above a sheet whose cells are 10 cm [m].
+    double restingHeight(bool isOnFloor) {
+        const auto [radius, beside] = GetParam();
+        const ShellMaterial material = materials::rubber();
+        TriangleMesh mesh = makeGrid({.size = {1, 1}, .cells = {10, 10}});
+        const double top = material.thickness * (isOnFloor ? 1.0 : 0.5);
+        mesh.positions.row(1).array() += top - 0.5 * material.thickness + 1e-6;
+        auto& sheet = scene.shells->add(mesh, material, {.friction = 1.0});
+        if (isOnFloor)
+            scene.addFloor();
+        else
+            for (int i = 0; i < sheet.vertexCount(); ++i) sheet.pin(i);
+        const btScalar aside(beside * std::sqrt(0.5));
+        auto& ball = scene.addSphere(radius, 0.02, btVector3(aside, btScalar(top + radius + 1e-4), aside));
+        ball.setAngularFactor(0);
+        ball.setLinearFactor(btVector3(0, 1, 0));
+        scene.run(1.0, kStep);
+        return ball.getWorldTransform().getOrigin().y() - radius - top;
+    }
+    Scene<> scene;
+};
+
+TEST_P(BallBesideAVertex, RestsOnAPinnedSheet) {
+    EXPECT_GT(restingHeight(false), -5e-4);
+}
+
+TEST_P(BallBesideAVertex, RestsOnASheetOnAFloor) {
+    EXPECT_GT(restingHeight(true), -5e-4);
+}
+INSTANTIATE_TEST_SUITE_P(Sizes, BallBesideAVertex,
+                         ::testing::Combine(::testing::Values(0.01, 0.03), ::testing::Values(0.007, 0.009, 0.012)));
+
 /// A ball of a thousandth of a vertex' mass, in steps of 1/20 s.
 TEST(Contact, SaysWhenContactsUseUpTheirRounds) {
     Scene scene;

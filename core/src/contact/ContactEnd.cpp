@@ -13,6 +13,7 @@ constexpr double kMostPush = 0.2;    // of an edge: how far pushOut goes
 constexpr int kMostTurns = 8;        // of the walls of a valley, at pushing
 constexpr double kSamePoint = 0.15;  // of an edge: how far it may move in a round
 constexpr double kSameWay = 0.7;     // cosine of the angle between normals that push a vertex much the same way
+constexpr double kTheSame = 0.995;   // the same of one that says what another does
 constexpr int kFreezeRound = 7;      // from here on normals stay: a triangle that tips to and fro would never settle
 
 }  // namespace
@@ -138,25 +139,29 @@ int ContactResponse::touchOf(const Contact& contact) const {
     return -1;
 }
 
+/// Whether a vertex is near some other body that does not touch it.
 bool ContactResponse::isNearOthers(int vertex, int body) const {
     return std::any_of(m_touches.begin(), m_touches.end(), [&](const Touch& touch) {
-        return touch.contact.isVertex() && touch.contact.body != body && globalVertex(touch.contact, 0) == vertex;
+        return touch.contact.isVertex() && !touch.active && touch.contact.body != body &&
+               globalVertex(touch.contact, 0) == vertex;
     });
 }
 
-/// Whether a face's contact is nearly at a vertex that is held off the body there, or is being taken out of it, much
-/// the same way. Beside a corner or an edge of the body it is not: the vertex is outside and its triangle cuts across.
-/// Between the edges of two bodies that is left as it is: each would push the triangle into the other.
+/// Whether a face's contact is nearly at a vertex that is held off the body there, or is being taken out of it, the same
+/// way. Beside a corner or an edge of the body, or beside a small ball, it is not: its triangle would go on into the
+/// body, and the more so where something else holds the vertex. Between the edges of two bodies, neither of which
+/// touches the vertex, each would push the triangle into the other: that is left to the vertex.
 bool ContactResponse::isSaidByVertex(const Contact& contact) const {
     int corner = 0;
     if (contact.weights.maxCoeff(&corner) < 1.0 - kNearEdge) return false;
-    const int vertex = globalVertex(contact, corner), filter = m_filterOf[vertex];
-    if (m_held[vertex] || isNearOthers(vertex, contact.body)) return true;
-    const auto isAlong = [&](const Vec3& n) { return n.dot(contact.normal) > kSameWay * n.norm(); };
-    for (int k = 0; filter >= 0 && k < m_filters[filter].count; ++k) {
-        const Touch& holds = m_touches[m_filters[filter].touches[k]];
-        if (holds.active && holds.contact.body == contact.body && isAlong(holds.contact.normal)) return true;
-    }
+    const int vertex = globalVertex(contact, corner);
+    if (isNearOthers(vertex, contact.body)) return true;
+    const auto isAlong = [&](const Vec3& n) { return n.dot(contact.normal) > kTheSame * n.norm(); };
+    Contact there = contact;
+    there.feature = Feature::vertex(contact.vertices[corner]);
+    const auto known = m_index.find(keyOf(there));
+    if (known != m_index.end() && m_touches[known->second].active && isAlong(m_touches[known->second].contact.normal))
+        return true;
     const auto raised = m_raised.find(vertex);
     return raised != m_raised.end() && isAlong(raised->second);
 }
