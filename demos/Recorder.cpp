@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <regex>
 #include <stdexcept>
 
 namespace jacket::demo {
@@ -11,10 +12,22 @@ namespace fs = std::filesystem;
 
 namespace {
 
-fs::path normalised(const fs::path& place) {
-    fs::path path = fs::absolute(place).lexically_normal();
+fs::path resolved(const fs::path& place) {
+    std::error_code error;
+    fs::path path = fs::weakly_canonical(fs::absolute(place), error);
+    if (error) throw InputError(place.string() + ": cannot be reached: " + error.message());
     if (!path.has_filename()) path = path.parent_path();
     return path;
+}
+
+/// An entry that is not among the command's own files; "" if there is none. Links are never its own.
+std::string foreignEntry(const fs::path& folder, const OutputKind& kind) {
+    const std::regex own(kind.paths);
+    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+        const std::string name = entry.path().lexically_relative(folder).generic_string();
+        if (entry.is_symlink() || !std::regex_match(name, own)) return name;
+    }
+    return "";
 }
 
 fs::path sibling(const fs::path& place, const std::string& what) {
@@ -26,42 +39,61 @@ fs::path sibling(const fs::path& place, const std::string& what) {
 
 }  // namespace
 
-void OutputDirectory::requireFree(const fs::path& place, const std::string& marker) {
-    const fs::path path = normalised(place);
-    if (path == path.root_path()) throw InputError("--out " + place.string() + ": is no place for results");
+void OutputDirectory::requireFree(const fs::path& place, const OutputKind& kind) {
+    const fs::path path = resolved(place);
+    if (path == path.root_path()) throw InputError(place.string() + ": is no place for results");
     if (!fs::exists(fs::symlink_status(path))) return;
-    if (!fs::is_directory(path))
-        throw InputError("--out " + place.string() + ": is there already and is not a directory");
-    if (!fs::is_empty(path) && !fs::exists(path / marker))
-        throw InputError("--out " + place.string() + ": is there already and holds no " + marker +
+    if (!fs::is_directory(path)) throw InputError(place.string() + ": is there already and is not a directory");
+    if (fs::is_empty(path)) return;
+    if (!fs::exists(path / kind.marker))
+        throw InputError(place.string() + ": is there already and holds no " + kind.marker +
                          "; only an earlier result is replaced");
+    if (const std::string foreign = foreignEntry(path, kind); !foreign.empty())
+        throw InputError(
+            place.string() + ": holds " + foreign +
+            ", which is no part of an earlier result and would be lost; move it, or give another directory");
 }
 
-OutputDirectory::OutputDirectory(const fs::path& place, const std::string& marker)
-    : m_place(normalised(place)), m_folder(sibling(m_place, "partial")) {
-    requireFree(place, marker);
+OutputDirectory::OutputDirectory(const fs::path& place, const OutputKind& kind)
+    : m_kind(kind), m_place(resolved(place)), m_folder(sibling(m_place, "partial")) {
+    requireFree(place, kind);
+    makeFolder(place);
+}
+
+void OutputDirectory::makeFolder(const fs::path& asGiven) {
     std::error_code error;
     fs::remove_all(m_folder, error);
+    for (fs::path parent = m_folder.parent_path(); !fs::exists(parent); parent = parent.parent_path())
+        m_madeParents.push_back(parent);
     if (!fs::create_directories(m_folder, error))
-        throw InputError("--out " + place.string() + ": cannot be made: " + error.message());
+        throw InputError(asGiven.string() + ": cannot be made: " + error.message());
 }
 
 OutputDirectory::~OutputDirectory() {
+    if (m_isKept) return;
     std::error_code ignored;
-    if (!m_committed) fs::remove_all(m_folder, ignored);
+    fs::remove_all(m_folder, ignored);
+    for (const fs::path& parent : m_madeParents) fs::remove(parent, ignored);  // unless something is in there by now
 }
 
 void OutputDirectory::commit() {
+    m_isKept = true;  // whatever happens from here on: a long run is not to be lost
+    try {
+        requireFree(m_place, m_kind);
+    } catch (const InputError& error) {  // somebody put it there meanwhile
+        throw std::runtime_error(std::string(error.what()) + ". The new result is in " + m_folder.string());
+    }
     const fs::path old = sibling(m_place, "old");
     const bool replaces = fs::exists(m_place);
-    if (replaces) fs::rename(m_place, old);
     std::error_code error;
-    fs::rename(m_folder, m_place, error);
+    if (replaces) fs::rename(m_place, old, error);
+    if (!error) fs::rename(m_folder, m_place, error);
     if (error) {
-        if (replaces) fs::rename(old, m_place);
-        throw std::runtime_error(m_place.string() + ": cannot be put in place: " + error.message());
+        std::error_code ignored;
+        if (fs::exists(old)) fs::rename(old, m_place, ignored);
+        throw std::runtime_error(m_place.string() + ": cannot be put in place: " + error.message() +
+                                 ". The new result is in " + m_folder.string());
     }
-    m_committed = true;
     fs::remove_all(old, error);
 }
 

@@ -17,7 +17,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kMarker = "report.json";
+constexpr OutputKind kReportOutput{
+    "report.json",
+    R"(index\.html|report\.json|(statics|motion|integrators|momentum|cheapest_motion|cheapest_statics)\.csv|)"
+    R"(plots(/(motion|statics)_[^/]*\.svg)?)"};
 
 struct ReportOptions {
     std::string out;
@@ -29,7 +32,7 @@ void writePictures(const fs::path& folder, const std::vector<report::Picture>& p
 }
 
 void writeReport(const fs::path& folder, const report::Report& result) {
-    writeText(folder / kMarker, report::toJson(result).dump(1) + '\n');
+    writeText(folder / kReportOutput.marker, report::toJson(result).dump(1) + '\n');
     writeText(folder / "statics.csv", report::staticsCsv(result));
     writeText(folder / "motion.csv", report::motionCsv(result));
     writeText(folder / "integrators.csv", report::integratorsCsv(result));
@@ -53,7 +56,7 @@ int printReferences(const ReportOptions& options) {
 
 int makeReport(const ReportOptions& options) {
     std::optional<OutputDirectory> directory;
-    if (!options.out.empty()) directory.emplace(options.out, kMarker);
+    if (!options.out.empty()) directory.emplace(options.out, kReportOutput);
     std::optional<Progress> progress;  // its number of items is known only once there is one
     const report::Report result = report::makeReport(options.quick, [&](int done, int all) {
         if (!progress) progress.emplace(std::cerr, Progress::styleFor(options.quiet), "report", all);
@@ -84,7 +87,7 @@ void addReportCommand(CLI::App& app, int& exitCode) {
                       "Computes anew, and prints, the stored references of motions; for developers");
     command->footer("Example:  jacket report --quick --out out/report");
     command->callback([options, command, &exitCode] {
-        if (command->count("--out")) OutputDirectory::requireFree(options->out, kMarker);
+        if (command->count("--out")) OutputDirectory::requireFree(options->out, kReportOutput);
         catchInterrupts();
         exitCode = options->reference ? printReferences(*options) : makeReport(*options);
     });

@@ -46,6 +46,7 @@ int resume(const ResumeOptions& options, const CLI::App& command) {
     checkOutputOptions(command, options.output);
     const fs::path folder = options.output.out;
     const Earlier earlier = readEarlier(folder);
+    OutputDirectory::requireFree(folder);
     SceneChanges changes;
     if (!options.seconds.empty()) changes.seconds = readDuration("--seconds", options.seconds);
     const Scene scene = loadScene(folder / "scene.json", changes);
@@ -68,7 +69,9 @@ int resume(const ResumeOptions& options, const CLI::App& command) {
 void addResumeCommand(CLI::App& app, int& exitCode) {
     CLI::App* command = app.add_subcommand("resume", "Continues a run to a later time");
     auto options = std::make_shared<ResumeOptions>();
-    command->add_option("dir", options->output.out, "Directory that `jacket run --out DIR` wrote; it is replaced")
+    command
+        ->add_option("dir", options->output.out,
+                     "Directory that `jacket run --out DIR` wrote; it is replaced, if nothing else is in it")
         ->required();
     command->add_option("--seconds", options->seconds, "Simulated time at which to end [s], later than DIR's");
     addOutputOptions(*command, options->output);

@@ -54,7 +54,8 @@ void addRunCommand(CLI::App& app, int& exitCode) {
         "  jacket run cloth_sphere --set shells.0.bending=quadratic --out out/cloth --png 4 --html\n"
         "  jacket run drape --dt 1/240 --seconds 1 --set 'shells.0.mesh.grid.cells=[40,40]' --profile\n"
         "  jacket run my_scene.json --set shells.sheet.friction=0.1\n"
-        "Without --out a summary is printed. An earlier result in DIR is replaced, anything else is not touched.");
+        "Without --out a summary is printed. An earlier result in DIR is replaced; a DIR that holds anything\n"
+        "else, also beside such a result, is refused.");
     command->callback([options, command, &exitCode] { exitCode = run(*options, *command); });
 }
 

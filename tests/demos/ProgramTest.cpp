@@ -86,6 +86,21 @@ TEST(Program, DrapesASheetInFewIterations) {
     EXPECT_LT(result["pcg_iterations"]["mean"].get<double>(), 15.0);  // 10 to 14: rounding decides how it folds
 }
 
+TEST(Program, LeavesFilesOfItsUsersAlone) {
+    const TemporaryFolder folder;
+    const std::string scene = folder.write("fall.json", kFallingSheet), out = folder / "out";
+    const std::vector<std::string> run{"run", scene, "--out", out, "--quiet"};
+    ASSERT_EQ(jacket(run).exitCode, 0);
+    EXPECT_EQ(jacket(run).exitCode, 0) << "an earlier result is replaced";
+    folder.write("out/notes.txt", "precious");
+    for (const auto& arguments : {run, {"resume", out, "--seconds", "0.2"}}) {
+        const Outcome again = jacket(arguments);
+        EXPECT_EQ(again.exitCode, 2);
+        EXPECT_NE(again.err.find("out: holds notes.txt"), std::string::npos) << again.err;
+    }
+    EXPECT_EQ(TemporaryFolder::read(folder / "out/notes.txt"), "precious");
+}
+
 TEST(Program, RunsTheSceneThatItWroteToTheSameEnd) {
     const TemporaryFolder folder;
     const std::string scene = folder.write("fall.json", kFallingSheet);

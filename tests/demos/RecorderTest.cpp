@@ -55,6 +55,74 @@ TEST(OutputDirectory, ReplacesAnEarlierResultAndNothingElse) {
     EXPECT_EQ(folder.entries(), 3);
 }
 
+std::string complaintAbout(const fs::path& place) {
+    try {
+        OutputDirectory::requireFree(place);
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    return "accepted";
+}
+
+TEST(OutputDirectory, RefusesToReplaceFilesThatNoRunWrote) {
+    const TemporaryFolder folder;
+    fs::create_directories(folder / "run/frames");
+    for (const char* name : {"scene.json", "result.json", "log.csv", "mesh_0.obj", "mesh_12.pc2", "view.html",
+                             "anim.glb", "frames/000000.png", "frames/1000000.png"})
+        folder.write(std::string("run/") + name, "");
+    EXPECT_EQ(complaintAbout(folder / "run"), "accepted");
+    for (const char* name : {"notes.txt", "mesh_a.obj", "result.json.bak", "frames/a.blend", ".git", "log.csv "}) {
+        const fs::path mine = folder.write(std::string("run/") + name, "mine");
+        EXPECT_NE(complaintAbout(folder / "run").find(std::string("run: holds ") + name), std::string::npos) << name;
+        fs::remove(mine);
+    }
+    fs::create_directory(folder / "run/sub");
+    EXPECT_NE(complaintAbout(folder / "run").find("holds sub"), std::string::npos);
+    fs::remove(folder / "run/sub");
+    fs::create_symlink(folder.path(), folder / "run/view.html.tmp");
+    fs::rename(folder / "run/view.html.tmp", folder / "run/anim.glb");
+    EXPECT_NE(complaintAbout(folder / "run").find("holds anim.glb"), std::string::npos);
+}
+
+TEST(OutputDirectory, KeepsFilesThatCameDuringTheRunAndTheResult) {
+    const TemporaryFolder folder;
+    fs::create_directory(folder / "run");
+    folder.write("run/result.json", "old");
+    fs::path kept;
+    {
+        OutputDirectory out(folder / "run");
+        writeText(out.folder() / "result.json", "new");
+        folder.write("run/notes.txt", "mine");
+        EXPECT_THROW(out.commit(), std::runtime_error);
+        kept = out.folder();
+    }
+    EXPECT_EQ(TemporaryFolder::read(folder / "run/notes.txt"), "mine");
+    EXPECT_EQ(TemporaryFolder::read(folder / "run/result.json"), "old");
+    EXPECT_EQ(TemporaryFolder::read(kept / "result.json"), "new");
+}
+
+TEST(OutputDirectory, WritesWhereALinkLeads) {
+    const TemporaryFolder folder;
+    fs::create_directory(folder / "disk");
+    fs::create_directory_symlink(folder / "disk", folder / "link");
+    {
+        OutputDirectory out(folder / "link");
+        writeText(out.folder() / "result.json", "new");
+        out.commit();
+    }
+    EXPECT_TRUE(fs::is_symlink(folder / "link"));
+    EXPECT_EQ(TemporaryFolder::read(folder / "disk/result.json"), "new");
+    fs::create_directory_symlink(folder / "nowhere", folder / "broken");
+    EXPECT_THROW(OutputDirectory{folder / "broken"}, InputError);
+}
+
+TEST(OutputDirectory, LeavesNoParentsBehindThatItMade) {
+    const TemporaryFolder folder;
+    fs::create_directory(folder / "a");
+    { OutputDirectory out(folder / "a/b/c/run"); }
+    EXPECT_TRUE(fs::is_empty(folder / "a"));
+}
+
 TEST(PointCache, HasItsHeaderAndTheSamplesInOrder) {
     const TemporaryFolder folder;
     Points x(3, 2);
