@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "ModelNames.h"
 #include "Scene.h"
@@ -57,6 +58,14 @@ fs::path readFile(ObjectReader& in, std::string_view key, const fs::path& folder
     for (const fs::path& file : {besideScene, given})
         if (fs::is_regular_file(file, ignored)) return fs::weakly_canonical(file);
     throw InputError(in.label(key) + ": there is no file " + besideScene.lexically_normal().string());
+}
+
+/// Of a direction that the scene keeps at length 1. One that has it but for rounding keeps its bits: normalised again
+/// with every reading, a scene that was written and read would end elsewhere.
+double lengthOf(const Vec3& direction) {
+    constexpr double kRounding = 8 * std::numeric_limits<double>::epsilon();
+    const double length = direction.norm();
+    return std::abs(length - 1.0) <= kRounding ? 1.0 : length;
 }
 
 Eigen::Vector2i readCells(ObjectReader& in, std::string_view key, int low) {
@@ -204,7 +213,7 @@ void readMaterial(ObjectReader& in, ShellDescription& shell) {
 Vec3 readDirection(ObjectReader& in) {
     const Vec3 direction = in.vector("direction");
     if (!(direction.norm() > 0)) in.fail("direction", "must not be zero");
-    return direction.normalized();
+    return direction / lengthOf(direction);
 }
 
 template <class Variant>
@@ -308,7 +317,7 @@ Plane readPlane(ObjectReader& in) {
     const auto plane = in.numbers("plane", 4, Range::any());
     const Vec3 normal(plane[0], plane[1], plane[2]);
     if (!(normal.norm() > 0)) in.fail("plane", "[nx, ny, nz, d] must have a normal that is not zero");
-    return {normal.normalized(), plane[3] / normal.norm()};
+    return {normal / lengthOf(normal), plane[3] / lengthOf(normal)};
 }
 
 Shape readShape(ObjectReader& in, const fs::path& folder);
@@ -423,7 +432,7 @@ Joint readJointKind(ObjectReader in) {
     joint.kind = kind == "prismatic" ? Joint::Kind::Prismatic : Joint::Kind::Revolute;
     joint.axis = in.vector(kind);
     if (!(joint.axis.norm() > 0)) in.fail(kind, "must be an axis, got [0, 0, 0]");
-    joint.axis.normalize();
+    joint.axis /= lengthOf(joint.axis);
     return joint;
 }
 

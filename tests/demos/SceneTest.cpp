@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "Scene.h"
 #include "SceneFile.h"
@@ -93,6 +94,31 @@ TEST_F(SceneTest, LinksOfMultiBodiesAreBodies) {
     EXPECT_EQ(arm.links[2].joint.kind, Joint::Kind::Fixed);
     const Json written = toJson(scene);
     EXPECT_EQ(written["bodies"].size(), 1u);
+    EXPECT_EQ(toJson(load(written.dump())), written);
+}
+
+/// Normalising a vector of length 1 anew changes its last bits in one case of five.
+TEST_F(SceneTest, DirectionsOfAnyLengthKeepTheirBitsOnceTheyAreWritten) {
+    std::mt19937 random(7);
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<double> exponent(-6, 6);
+    Json scene = parseJson(kScene, "scene.json");
+    Json& links =
+        (scene["multibodies"] = parseJson(R"([{"base":{"shape":{"sphere":0.1}},"links":[]}])", ""))[0]["links"];
+    for (int i = 0; i < 500; ++i) {
+        const double scale = std::pow(10.0, exponent(random));
+        const Json direction = toJson(scale * Vec3(normal(random), normal(random), normal(random)));
+        Json plane = direction;
+        plane.push_back(normal(random));
+        scene["bodies"].push_back({{"shape", {{"plane", plane}}}});
+        for (const char* key : {"guide", "clamp"})
+            scene["shells"][0][key].push_back({{"vertices", {0}}, {"direction", direction}});
+        links.push_back({{"name", "link" + std::to_string(i)}, {"shape", {{"sphere", 0.1}}}, {"mass", 1}});
+        links.back()["joint"] = {{i % 2 == 0 ? "prismatic" : "revolute", direction}};
+    }
+    const Scene read = load(scene.dump());
+    EXPECT_NEAR(std::get<Plane>(read.bodies.at(1).shape).normal.norm(), 1.0, 1e-15);
+    const Json written = toJson(read);
     EXPECT_EQ(toJson(load(written.dump())), written);
 }
 
