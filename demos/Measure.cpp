@@ -20,7 +20,7 @@ EnergyBalance energyOf(const World& world, const std::vector<BodyState>& bodies)
     for (int k = 0; k < world.shellCount(); ++k) {
         const Shell& shell = world.shell(k);
         const ShellEnergy energy = shell.energy();
-        sum.kinetic += energy.kinetic;
+        sum.kinetic += 0.5 * world.velocities(k).colwise().squaredNorm().dot(shell.masses());
         sum.membrane += energy.membrane;
         sum.bending += energy.bending;
         sum.plasticWork += energy.plasticWork;
@@ -37,7 +37,7 @@ EnergyBalance energyOf(const World& world, const std::vector<BodyState>& bodies)
 double momentumScale(const World& world, const std::vector<BodyState>& bodies) {
     double scale = 0.0;
     for (int k = 0; k < world.shellCount(); ++k)
-        scale += world.shell(k).velocities().colwise().norm().dot(world.shell(k).masses());
+        scale += world.velocities(k).colwise().norm().dot(world.shell(k).masses());
     for (const BodyState& body : bodies)
         if (body.isDynamic) scale += body.description->mass * body.velocity.norm();
     return scale;

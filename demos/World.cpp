@@ -243,9 +243,18 @@ std::vector<BodyState> World::bodies() const {
     return m_impl->bodies.states();
 }
 
+Points World::velocities(int index) const {
+    const Shell& solved = shell(index);
+    const Vec3 pendingMomentum = solved.linearMomentum() - fromBullet(m_impl->shells[index].linearMomentum());
+    const Vec3 pending = pendingMomentum / solved.masses().sum();
+    Points velocities = solved.velocities();
+    for (int i = 0; i < solved.vertexCount(); ++i) velocities.col(i) -= solved.freedom(i) * pending;
+    return velocities;
+}
+
 Vec3 World::linearMomentum() const {
     Vec3 momentum = Vec3::Zero();
-    for (int k = 0; k < shellCount(); ++k) momentum += fromBullet(m_impl->shells[k].linearMomentum());
+    for (int k = 0; k < shellCount(); ++k) momentum += velocities(k) * shell(k).masses();
     for (const BodyState& body : bodies())
         if (body.description->mass > 0) momentum += body.description->mass * body.velocity;
     return momentum;

@@ -61,6 +61,9 @@ class World {
     Points contactForces(int shell) const;
     const Points& initialPositions(int shell) const;
     std::vector<BodyState> bodies() const;
+    /// Of a shell's vertices at the moment of the bodies' and of all positions: shell() holds in its velocities already
+    /// the gravity of the coming step, which Bullet's bodies receive only then [m/s].
+    Points velocities(int shell) const;
     Vec3 linearMomentum() const;   ///< of shells and dynamic bodies, at one moment [N s]
     int rejectedSteps() const;     ///< since the start
     int unconvergedSteps() const;  ///< since the start: a solve used up its iterations, or a contact ended too deep

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <vector>
 
 #include "Json.h"
@@ -99,6 +100,48 @@ TEST(Program, LeavesFilesOfItsUsersAlone) {
         EXPECT_NE(again.err.find("out: holds notes.txt"), std::string::npos) << again.err;
     }
     EXPECT_EQ(TemporaryFolder::read(folder / "out/notes.txt"), "precious");
+}
+
+/// A column of log.csv.
+std::vector<double> columnOf(const std::string& log, const std::string& name) {
+    std::istringstream lines(log);
+    std::string line, cell;
+    std::getline(lines, line);
+    std::istringstream header(line);
+    int column = 0;
+    while (std::getline(header, cell, ',') && cell != name) ++column;
+    std::vector<double> values;
+    while (std::getline(lines, line)) {
+        std::istringstream cells(line);
+        for (int k = 0; k <= column; ++k) std::getline(cells, cell, ',');
+        values.push_back(std::stod(cell));
+    }
+    return values;
+}
+
+/// Sheet and ball fall alike: before the first frame, with the velocity at the end of each.
+TEST(Program, EnergiesAndMomentaAreOfOneMoment) {
+    const TemporaryFolder folder;
+    const std::string scene = folder.write("fall.json", kFallingSheet);
+    const std::vector<std::string> bodies[] = {
+        {}, {"--set", R"(bodies=[{"shape":{"sphere":0.1},"mass":3,"position":[5,0,0]}])"}};
+    for (const auto& options : bodies) {
+        std::vector<std::string> run{"run",  scene,  "--out", folder / "out", "--quiet",
+                                     "--dt", "1/20", "--set", "substeps=3"};
+        run.insert(run.end(), options.begin(), options.end());
+        ASSERT_EQ(jacket(run).exitCode, 0);
+        const double mass = options.empty() ? 1.0 : 4.0, h = 1.0 / 60;
+        const std::string log = TemporaryFolder::read(folder / "out/log.csv");
+        const auto kinetic = columnOf(log, "kinetic_J"), momentum = columnOf(log, "momentum_y_Ns"),
+                   total = columnOf(log, "total_J");
+        ASSERT_EQ(kinetic.size(), 2u);
+        for (std::size_t k = 0; k < kinetic.size(); ++k) {
+            const double n = 3.0 * static_cast<double>(k + 1);  // steps of symplectic Euler
+            EXPECT_NEAR(momentum[k], -mass * 10 * n * h, 1e-5);
+            EXPECT_NEAR(kinetic[k], momentum[k] * momentum[k] / (2 * mass), 1e-5);
+            EXPECT_NEAR(total[k], -mass * 100 * h * h * n / 2, 1e-5);  // fallen by g h^2 n (n + 1) / 2
+        }
+    }
 }
 
 TEST(Program, RunsTheSceneThatItWroteToTheSameEnd) {
