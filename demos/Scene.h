@@ -143,7 +143,7 @@ struct MultiBodyDescription {
 };
 
 struct ProbeDescription {
-    std::string name;
+    std::string name, label;
     int shell = -1, body = -1;  ///< one of them
     std::optional<Selection> where;
     std::string quantity;

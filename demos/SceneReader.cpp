@@ -498,6 +498,7 @@ ProbeDescription readProbe(ObjectReader in, const Scene& scene) {
     checkKeys(in, kProbeKeys);
     ProbeDescription probe;
     probe.name = in.text("name");
+    probe.label = in.label();
     if (in.oneOf(targets) == "body") {
         probe.body = indexByName(in, "body", scene.bodies);
         probe.quantity = in.choice("quantity", ofBody, {});
@@ -581,6 +582,7 @@ Scene readScene(const Json& document, const SceneOrigin& origin) {
     requireDistinctNames(scene.shells, "shells");
     requireDistinctNames(scene.bodies, "bodies");
     in.forEach("probes", [&](ObjectReader probe) { scene.probes.push_back(readProbe(std::move(probe), scene)); });
+    requireDistinctNames(scene.probes, "probes");
     return scene;
 }
 

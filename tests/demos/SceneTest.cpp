@@ -195,6 +195,9 @@ TEST_F(SceneTest, EveryMistakeIsNamedWithItsPath) {
         {"bodies.0.kinematic={\"velocity\":[1,0,0]}", "bodies.0.kinematic needs mass 0"},
         {"probes.0.quantity=speed", "has the unknown value \"speed\"; did you mean"},
         {"probes.0.shell=shet", "probes.0.shell has the unknown value \"shet\"; did you mean \"sheet\"?"},
+        {"probes=[{\"name\":\"p\",\"shell\":\"sheet\",\"quantity\":\"reaction\"},"
+         "{\"name\":\"p\",\"body\":\"ball\",\"quantity\":\"position\"}]",
+         "probes.1.name: two probes are called \"p\""},
         {"shells.0.material.yield=0", "shells.0.material.yield [Pa] must be > 0, got 0"},
         {"shells.0.material.hardening=-1", "shells.0.material.hardening [Pa] must be >= 0, got -1"},
         {"shells.0.material.orthotropy={\"weft_young\":1e9}", "shells.0.material.orthotropy.shear is missing"},
