@@ -72,6 +72,17 @@ void flatten(const std::string& name, const Json& value, Columns& columns) {
     }
 }
 
+/// Meshes, selections and supports are only looked at as the world is built.
+void checkCase(const SweepPlan& plan, int index) {
+    SceneChanges changes;
+    changes.set = plan.changes(index);
+    try {
+        const World world(loadScene(findScene(plan.scene), changes));
+    } catch (const InputError& error) {
+        throw InputError(plan.label(index) + ": " + error.what());
+    }
+}
+
 }  // namespace
 
 int SweepPlan::cases() const {
@@ -88,6 +99,13 @@ std::vector<std::string> SweepPlan::changes(int index) const {
         index /= count;
     }
     return set;
+}
+
+std::string SweepPlan::label(int index) const {
+    std::string text = "case " + std::to_string(index) + " (";
+    const std::vector<std::string> set = changes(index);
+    for (std::size_t k = 0; k < set.size(); ++k) text += (k == 0 ? "" : ", ") + set[k];
+    return text + ")";
 }
 
 fs::path SweepPlan::folderOf(int index) const {
@@ -137,11 +155,7 @@ void writePlan(const SweepPlan& plan) {
     }
     if (fs::exists(plan.folder) && (!fs::is_directory(plan.folder) || !fs::is_empty(plan.folder)))
         throw InputError("--out " + plan.folder.string() + ": is there already and holds no plan");
-    for (int k = 0; k < plan.cases(); ++k) {
-        SceneChanges changes;
-        changes.set = plan.changes(k);
-        loadScene(findScene(plan.scene), changes);
-    }
+    for (int k = 0; k < plan.cases(); ++k) checkCase(plan, k);
     std::error_code error;
     fs::create_directories(plan.folder, error);
     if (error) throw InputError("--out " + plan.folder.string() + ": cannot be made: " + error.message());

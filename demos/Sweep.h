@@ -22,6 +22,7 @@ struct SweepPlan {
     int cases() const;
     /// The "path=value" of each axis. The last axis runs fastest.
     std::vector<std::string> changes(int index) const;
+    std::string label(int index) const;  ///< "case 1 (dt=1/60, shells.0.friction=0.3)", for messages
     std::filesystem::path folderOf(int index) const;
     bool isDone(int index) const;
 };
@@ -29,8 +30,8 @@ struct SweepPlan {
 /// "path=a,b,[1,2]": commas inside brackets and quotes separate nothing. Throws InputError.
 SweepAxis parseSweepAxis(const std::string& text);
 
-/// Checks that every case is a scene, and writes folder/plan.json. An equal plan that is there already is left alone,
-/// any other is refused: throws InputError.
+/// Checks that every case is a scene that can be built, and writes folder/plan.json. An equal plan that is there
+/// already is left alone, any other is refused: throws InputError.
 void writePlan(const SweepPlan& plan);
 /// From plan.json or the directory that holds it; throws InputError.
 SweepPlan readPlan(const std::filesystem::path& place);

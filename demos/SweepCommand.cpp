@@ -62,6 +62,21 @@ int runCase(const SweepPlan& plan, int index, const RunOutput& output) {
     return runScene(loadScene(findScene(plan.scene), changes), toCase);
 }
 
+/// The same; a case that cannot be run is named, and does not keep others from running.
+int tryCase(const SweepPlan& plan, int index, const RunOutput& output) {
+    const auto report = [&](const std::exception& error, ExitCode code) {
+        std::cerr << "jacket: " << plan.label(index) << ": " << error.what() << '\n';
+        return code;
+    };
+    try {
+        return runCase(plan, index, output);
+    } catch (const InputError& error) {
+        return report(error, kBadInput);
+    } catch (const std::exception& error) {
+        return report(error, kInternalError);
+    }
+}
+
 int runPlan(SweepOptions options, const CLI::App& command) {
     const SweepPlan plan = readPlan(options.plan);
     options.output.out = plan.folder.string();  // there is a directory to put things in
@@ -70,15 +85,17 @@ int runPlan(SweepOptions options, const CLI::App& command) {
         if (options.which < 0 || options.which >= plan.cases())
             throw InputError("--case must be 0.." + std::to_string(plan.cases() - 1) + ", got " +
                              std::to_string(options.which));
-        return runCase(plan, options.which, options.output);
+        return tryCase(plan, options.which, options.output);
     }
-    int worst = kOk;
+    int failure = kOk, worst = kOk;  // of the first case without a result; of results
     for (int k = 0; k < plan.cases(); ++k) {
-        const int code = runCase(plan, k, options.output);
+        const int code = tryCase(plan, k, options.output);
         if (code == kInterrupted) return code;
-        worst = std::max(worst, code);
+        const bool hasFailed = code == kBadInput || code == kInternalError;
+        if (hasFailed && failure == kOk) failure = code;
+        if (!hasFailed) worst = std::max(worst, code);
     }
-    return worst;
+    return failure == kOk ? worst : failure;
 }
 
 int collect(const SweepOptions& options) {

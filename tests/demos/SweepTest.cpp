@@ -62,6 +62,22 @@ TEST(Sweep, RunsCasesOneByOneAndCollectsThem) {
     EXPECT_EQ(jacket({"sweep", "run", out, "--case", "4"}).exitCode, 2);
 }
 
+TEST(Sweep, RunsOtherCasesWhereOneCannotBeRun) {
+    const TemporaryFolder folder;
+    const std::string scene = folder.write("ball.json", kBallOnSheet), out = folder / "sweep";
+    ASSERT_EQ(jacket({"sweep", "plan", scene, "--set", "shells.0.friction=0.1,0.2,0.3", "--out", out}).exitCode, 0);
+    fs::create_directory(out + "/case_0001");
+    folder.write("sweep/case_0001/notes.txt", "not a result");
+    const Outcome run = jacket({"sweep", "run", out, "--quiet"});
+    EXPECT_EQ(run.exitCode, 2);
+    EXPECT_TRUE(run.err.starts_with("jacket: case 1 (shells.0.friction=0.2): ")) << run.err;
+    EXPECT_TRUE(fs::exists(out + "/case_0002/result.json"));
+    const Outcome collected = jacket({"sweep", "collect", out});
+    EXPECT_EQ(collected.exitCode, 0);
+    EXPECT_NE(collected.err.find("1 of 3 cases are not finished: 1"), std::string::npos) << collected.err;
+    EXPECT_EQ(std::count(collected.out.begin(), collected.out.end(), '\n'), 3);
+}
+
 TEST(Sweep, RefusesABadPlanBeforeAnythingIsWritten) {
     const TemporaryFolder folder;
     const std::pair<std::vector<std::string>, const char*> cases[] = {
@@ -69,6 +85,8 @@ TEST(Sweep, RefusesABadPlanBeforeAnythingIsWritten) {
         {{"trampoline", "--set", "shells.0.frictoin=0.1"}, "did you mean \"friction\"?"},
         {{"trampoline", "--set", "shells.0.material.thickness=1e-3,-1"}, "must be > 0, got -1"},
         {{"trampoline", "--set", "dt=1/60", "--set", "dt=1/120"}, "is given twice"},
+        {{"trampoline", "--set", R"(shells.0.pin=[{"vertices":[1]}],[{"vertices":[99999]}])"},
+         R"(case 1 (shells.0.pin=[{"vertices":[99999]}]): )"},
     };
     for (auto [arguments, expected] : cases) {
         arguments.insert(arguments.begin(), {"sweep", "plan"});
