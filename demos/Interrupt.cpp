@@ -11,11 +11,16 @@ namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
 
+void onSignal(int) {
+    interrupted = 1;
+    for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
+}
+
 }  // namespace
 
 void catchInterrupts() {
-    std::signal(SIGINT, [](int) { interrupted = 1; });
-    std::signal(SIGTERM, [](int) { interrupted = 1; });
+    if (isInterrupted()) return;
+    for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, onSignal);
 }
 
 bool isInterrupted() {

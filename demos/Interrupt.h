@@ -2,7 +2,8 @@
 
 namespace jacket::demo {
 
-/// From now on SIGINT and SIGTERM let a job end by itself: it asks isInterrupted().
+/// From now on the first SIGINT or SIGTERM lets a job end by itself: it asks isInterrupted(). A second one ends the
+/// program at once.
 void catchInterrupts();
 bool isInterrupted();
 /// Says so on stderr. Returns the program's exit code.

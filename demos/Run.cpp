@@ -91,7 +91,8 @@ Profile simulate(World& world, Result& result, Files& files, Progress::Style sty
     Progress progress(std::cerr, style, world.scene().name, frames, world.scene().dt);
     Profile profile;
     for (int frame = 1; frame <= frames && !isInterrupted(); ++frame) {
-        const FrameReport report = world.step();
+        const FrameReport report = world.step(isInterrupted);
+        if (isInterrupted()) break;  // the frame is not whole
         const double start = wallSeconds();
         const FrameRecord record = measure(world, frame, report);
         result.add(record);

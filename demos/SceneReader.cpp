@@ -535,12 +535,20 @@ CameraDescription readCamera(ObjectReader in) {
     return camera;
 }
 
+/// Parts of a frame. A million take a minute in the smallest scene, hours in others: more are a slip of the keyboard.
+int readParts(ObjectReader& in, std::string_view key, int fallback) {
+    constexpr int kMost = 1000000;
+    const int parts = in.integer(key, 1, fallback);
+    if (parts > kMost) in.fail(key, "must be <= " + std::to_string(kMost) + ", got " + std::to_string(parts));
+    return parts;
+}
+
 /// Numbers of the whole run.
 void readRun(ObjectReader& in, Scene& scene) {
     scene.description = in.text("description", "");
     scene.name = in.text("name", scene.name);
     scene.dt = in.duration("dt", scene.dt);
-    scene.substeps = in.integer("substeps", 1, scene.substeps);
+    scene.substeps = readParts(in, "substeps", scene.substeps);
     scene.seconds = in.duration("seconds", scene.seconds);
     scene.seed = static_cast<std::uint64_t>(in.integer("seed", 0, 0));
     scene.gravity = in.vector("gravity", scene.gravity);
@@ -548,7 +556,7 @@ void readRun(ObjectReader& in, Scene& scene) {
     if (in.has("camera")) scene.camera = readCamera(in.object("camera"));
     static const Names modes{"dynamic", "static"};
     scene.isStatic = in.choice("mode", modes, "dynamic") == "static";
-    scene.loadIncrements = in.integer("load_increments", 1, scene.loadIncrements);
+    scene.loadIncrements = readParts(in, "load_increments", scene.loadIncrements);
     constexpr double kMostFrames = 1e8;
     if (scene.seconds / scene.dt > kMostFrames)
         in.fail("seconds", "[s] must be <= 1e8 frames of dt, got " + shortNumber(scene.seconds));

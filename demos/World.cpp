@@ -109,9 +109,9 @@ struct World::Impl {
     }
 
     /// Everything to its equilibrium, without time.
-    void settle(FrameReport& report) {
+    void settle(FrameReport& report, const std::function<bool()>& isCancelled) {
         const double start = wallSeconds();
-        for (int k = 0; k < shells.size(); ++k) {
+        for (int k = 0; k < shells.size() && !isCancelled(); ++k) {
             const StaticReport done =
                 shells[k].settle(world->getGravity(), {.increments = scene.loadIncrements, .maxIterations = 200});
             report.converged = report.converged && done.converged;
@@ -182,12 +182,12 @@ World::World(const Scene& scene, int threads) : m_impl(std::make_unique<Impl>(sc
 }
 World::~World() = default;
 
-FrameReport World::step() {
+FrameReport World::step(const std::function<bool()>& isCancelled) {
     FrameReport report;
     if (scene().isStatic)
-        m_impl->settle(report);
+        m_impl->settle(report, isCancelled);
     else
-        for (int i = 0; i < scene().substeps; ++i) m_impl->step(report);
+        for (int i = 0; i < scene().substeps && !isCancelled(); ++i) m_impl->step(report);
     return report;
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -49,7 +50,9 @@ class World {
     explicit World(const Scene& scene, int threads = 1);
     ~World();
 
-    FrameReport step();  ///< one frame of scene.dt
+    /// One frame of scene.dt. It ends before the next of its steps, or of its static shells, where `isCancelled` says
+    /// so.
+    FrameReport step(const std::function<bool()>& isCancelled = [] { return false; });
     double time() const;
 
     const Scene& scene() const;

@@ -1,10 +1,14 @@
 #include <gtest/gtest.h>
+#include <sys/time.h>
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
+#include <cstdlib>
 #include <sstream>
 #include <vector>
 
+#include "Interrupt.h"
 #include "Json.h"
 #include "RunProgram.h"
 #include "SceneFile.h"
@@ -215,6 +219,36 @@ TEST(Program, ReportsADent) {
     EXPECT_LT(std::abs(dent["position"][0].get<double>()), 0.69);
     EXPECT_LT(std::abs(dent["position"][2].get<double>()), 0.49);
     EXPECT_NEAR(dent["position"][1].get<double>(), 0.68, 0.05);
+}
+
+/// In a process of its own: raises SIGINT after half a second of running a scene whose first frame takes a minute.
+[[noreturn]] void runInterrupted(const std::string& scene, const std::string& out) {
+    std::signal(SIGALRM, [](int) { std::raise(SIGINT); });
+    const itimerval halfASecond{{0, 0}, {0, 500000}};
+    setitimer(ITIMER_REAL, &halfASecond, nullptr);
+    const char* arguments[] = {"jacket", "run", scene.c_str(), "--out", out.c_str(), "--set", "substeps=1000000"};
+    std::exit(runProgram(std::size(arguments), arguments));
+}
+
+TEST(ProgramDeathTest, EndsBetweenTheStepsOfAFrameWhenInterrupted) {
+    const TemporaryFolder folder;
+    const std::string scene = folder.write("fall.json", kFallingSheet);
+    EXPECT_EXIT(runInterrupted(scene, folder / "out"), testing::ExitedWithCode(130),
+                "interrupted; nothing was written");
+    EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(ProgramDeathTest, ASecondSignalEndsItAtOnce) {
+    const auto interruptTwice = [](int first, int second) {
+        catchInterrupts();
+        std::raise(first);
+        if (!isInterrupted()) std::exit(1);
+        catchInterrupts();  // the next case of a sweep
+        std::raise(second);
+        std::exit(2);
+    };
+    EXPECT_EXIT(interruptTwice(SIGINT, SIGINT), testing::KilledBySignal(SIGINT), "");
+    EXPECT_EXIT(interruptTwice(SIGINT, SIGTERM), testing::KilledBySignal(SIGTERM), "");
 }
 
 TEST(Program, BadInputIsExitCode2WithOneMessageAndNothingWritten) {
