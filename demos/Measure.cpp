@@ -125,8 +125,8 @@ FrameRecord measure(const World& world, int frame, const FrameReport& report) {
     record.frame = frame;
     record.time = world.time();
     record.report = report;
-    record.isStateFinite = isFinite(world, bodies);
     record.energy = energyOf(world, bodies);
+    record.isFinite = isFinite(world, bodies) && std::isfinite(record.energy.total() + record.energy.plasticWork);
     record.momentum = world.linearMomentum();
     record.momentumScale = momentumScale(world, bodies);
     for (int k = 0; k < world.shellCount(); ++k)

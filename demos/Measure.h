@@ -27,7 +27,7 @@ struct FrameRecord {
     double momentumScale = 0.0;    ///< sum of mass times speed [N s]
     double maxStretch = 0.0;       ///< largest edge length / rest length - 1 [-]
     Penetration penetration;
-    bool isStateFinite = true;  ///< every position and velocity
+    bool isFinite = true;  ///< every position, velocity and energy
     FrameReport report;
 };
 

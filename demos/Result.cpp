@@ -47,7 +47,8 @@ Result::Result(const World& start)
       m_deepest(m_start),
       m_peakStretch(m_start.maxStretch),
       m_momentumScale(m_start.momentumScale),
-      m_substeps(start.scene().substeps) {}
+      m_substeps(start.scene().substeps),
+      m_finite(m_start.isFinite) {}
 
 void Result::add(const FrameRecord& frame) {
     m_end = frame;
@@ -61,7 +62,7 @@ void Result::add(const FrameRecord& frame) {
     const Vec3 drift = frame.momentum - m_start.momentum - m_weight * frame.time;
     m_momentumDrift = std::max(m_momentumDrift, drift.norm());
     m_converged = m_converged && frame.report.converged;
-    m_finite = m_finite && frame.report.finite && frame.isStateFinite;
+    m_finite = m_finite && frame.report.finite && frame.isFinite;
     m_yielding.resize(std::max(m_yielding.size(), frame.report.dents.size()));
     for (std::size_t k = 0; k < frame.report.dents.size(); ++k)
         if (frame.report.dents[k].work > m_yielding[k].most.work) m_yielding[k] = {frame.report.dents[k], frame.time};

@@ -27,7 +27,7 @@ class Result {
     double m_peakStretch, m_momentumDrift = 0.0, m_momentumScale = 0.0, m_wall = 0.0;
     double m_iterations = 0.0;  ///< over all steps
     int m_mostIterations = 0, m_substeps;
-    bool m_converged = true, m_finite = true;
+    bool m_converged = true, m_finite;
     struct Yielding {
         Dent most;  ///< of the frame with the most plastic work
         double time = 0.0;

@@ -100,7 +100,7 @@ Profile simulate(World& world, Result& result, Files& files, Progress::Style sty
         if (afterFrame) afterFrame(frame, world);
         profile.add(report, world.scene().substeps, wallSeconds() - start);
         progress.update(frame);
-        if (!record.isStateFinite) break;
+        if (!record.isFinite) break;
     }
     return profile;
 }

@@ -4,6 +4,8 @@
 #include <BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h>
 #include <btBulletDynamicsCommon.h>
 
+#include <algorithm>
+#include <limits>
 #include <type_traits>
 
 #include "Bodies.h"
@@ -82,7 +84,22 @@ struct World::Impl {
         return triangles;
     }
 
+    /// Numbers of Bullet's precision lie farther apart the larger they are.
+    static void requireEdgesSurviveRounding(const ShellDescription& description, const Shell& shell, const Points& x) {
+        const Points& rest = shell.restPositions();
+        double shortest = std::numeric_limits<double>::infinity();
+        for (const auto& edge : shell.mesh().edges())
+            shortest = std::min(shortest, (rest.col(edge.v0) - rest.col(edge.v1)).norm());
+        const double farthest = x.cwiseAbs().maxCoeff();
+        const double spacing = farthest * double(std::numeric_limits<btScalar>::epsilon());
+        if (spacing <= 0.1 * shortest) return;
+        throw InputError(description.label + ": starts too far from the origin: at " + shortNumber(farthest) +
+                         " m positions of " + precision() + " precision are " + shortNumber(spacing) +
+                         " m apart, and the shortest edge is " + shortNumber(shortest) + " m long");
+    }
+
     void place(bullet::ShellBody& shell, const ShellDescription& description, Points x, std::uint64_t seed) {
+        requireEdgesSurviveRounding(description, shell.shell(), x);
         std::vector<char> isPinned(x.cols(), 0);
         for (const Selection& pin : description.pins)
             for (const int vertex : pin.vertices(x)) isPinned[vertex] = 1;

@@ -193,6 +193,15 @@ TEST(Program, SaysHowManyStepsDidNotConverge) {
     EXPECT_NE(run.out.find("NOT CONVERGED: in " + std::to_string(steps) + " of 6 steps"), std::string::npos) << run.out;
 }
 
+/// Positions and velocities are numbers still, energies are not.
+TEST(Program, EnergiesThatOverflowAreNotFinite) {
+    const TemporaryFolder folder;
+    const std::string scene = folder.write("fall.json", kFallingSheet);
+    const Outcome run = jacket({"run", scene, "--out", folder / "out", "--quiet", "--set", "gravity=[0,-1e200,0]"});
+    EXPECT_EQ(run.exitCode, 4);
+    EXPECT_EQ(parseJson(readText(folder / "out" / "result.json"), "result.json")["finite"], false);
+}
+
 TEST(Program, SettlesAStaticScene) {
     const Json result = resultOf("cantilever");
     EXPECT_EQ(result["frames"], 1);
@@ -264,6 +273,7 @@ TEST(Program, BadInputIsExitCode2WithOneMessageAndNothingWritten) {
         {{"run", scene, "--set", "shells.0.pin=[{\"box\":[[5,5,5],[6,6,6]]}]"}, "selects no vertex"},
         {{"run", scene, "--set", "shells.0.material.thickness=-1"}, "must be > 0, got -1"},
         {{"run", scene, "--set", "probes.0.box=[[5,5,5],[6,6,6]]"}, "probes.0.box selects no vertex"},
+        {{"run", scene, "--set", "shells.0.transform={\"position\":[0,1e300,0]}"}, "starts too far from the origin"},
         {{"run", scene, "--threads", "0"}, "--threads must be 1..64, got 0"},
         {{"run", scene, "--threads", "65"}, "--threads must be 1..64, got 65"},
         {{"run", "cantilever", "--profile"}, "takes no steps"},
