@@ -88,9 +88,11 @@ btVector3 ShellBody::velocity(int vertex) const {
 
 void ShellBody::pin(int vertex) {
     m_shell.pin(vertex);
+    endAnchorsOfHeld();
 }
 void ShellBody::movePin(int vertex, const btVector3& target) {
     m_shell.movePin(vertex, fromBullet(target));
+    endAnchorsOfHeld();
 }
 void ShellBody::unpin(int vertex) {
     m_shell.unpin(vertex);
@@ -98,6 +100,7 @@ void ShellBody::unpin(int vertex) {
 
 void ShellBody::clamp(const std::vector<int>& vertices, std::optional<btVector3> direction) {
     m_shell.clamp(vertices, direction ? std::optional(fromBullet(*direction)) : std::nullopt);
+    endAnchorsOfHeld();
 }
 
 StaticReport ShellBody::settle(const btVector3& gravity, const StaticSettings& settings) {
@@ -115,10 +118,27 @@ void ShellBody::anchor(int vertex, btMultiBodyLinkCollider& link) {
 }
 
 void ShellBody::anchorTo(int vertex, btCollisionObject& body) {
-    if (vertex < 0 || vertex >= vertexCount())
-        throw std::out_of_range("ShellBody::anchor: vertex must be 0.." + std::to_string(vertexCount() - 1) + ", got " +
-                                std::to_string(vertex));
+    requireVertex(vertex, "ShellBody::anchor");
+    unanchor(vertex);  // two would be two equations for the same unknowns
+    if (m_shell.isPinned(vertex) || m_shell.isGuided(vertex)) m_shell.unpin(vertex);
     m_anchors.push_back({vertex, &body, body.getWorldTransform().inverse() * m_positions[vertex]});
+}
+
+void ShellBody::unanchor(int vertex) {
+    requireVertex(vertex, "ShellBody::unanchor");
+    std::erase_if(m_anchors, [&](const Anchor& anchor) { return anchor.vertex == vertex; });
+}
+
+void ShellBody::endAnchorsOfHeld() {
+    std::erase_if(m_anchors, [&](const Anchor& anchor) {
+        return m_shell.isPinned(anchor.vertex) || m_shell.isGuided(anchor.vertex);
+    });
+}
+
+void ShellBody::requireVertex(int vertex, const char* what) const {
+    if (vertex < 0 || vertex >= vertexCount())
+        throw std::out_of_range(std::string(what) + ": vertex must be 0.." + std::to_string(vertexCount() - 1) +
+                                ", got " + std::to_string(vertex));
 }
 
 bool ShellBody::isAsleep() const {

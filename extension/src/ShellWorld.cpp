@@ -246,14 +246,16 @@ void ShellWorld::followGravity(double h) {
     }
 }
 
-/// A removed body lets go.
+/// A removed body lets go, and so does every body of a vertex that the user has pinned or guided since.
 void ShellWorld::releaseAnchors(btCollisionWorld& world) {
-    for (const auto& shell : m_shells)
+    for (const auto& shell : m_shells) {
+        shell->endAnchorsOfHeld();
         std::erase_if(shell->m_anchors, [&](auto& anchor) {
             const int id = idOf(world, anchor.body);
             if (anchor.bodyId < 0) anchor.bodyId = id;
             return id < 0 || id != anchor.bodyId;
         });
+    }
 }
 
 /// Shells that were added, or given a velocity, since the last step have no solved velocity to move with: they get one

@@ -81,10 +81,14 @@ class ShellBody {
     /// Moves the shell to its equilibrium under gravity, its forces and pressure, as held, without bodies: see
     /// jacket/Statics.h.
     StaticReport settle(const btVector3& gravity, const StaticSettings& settings = {});
-    /// Ties a vertex to a body at their present distance. The body may be removed at any time, which frees the vertex
-    /// (also if the body is added again: a new entry of the broadphase is a new body).
+    /// Ties a vertex to a body at their present distance. One thing at a time holds a vertex, the one that was asked
+    /// for last: an anchor ends the vertex's pin, guide or earlier anchor (also to the same body), and what pins,
+    /// clamps or guides the vertex ends its anchor. The body may be removed at any time, which frees the vertex (also
+    /// if the body is added again: a new entry of the broadphase is a new body). Throws std::out_of_range.
     void anchor(int vertex, btRigidBody& body);
     void anchor(int vertex, btMultiBodyLinkCollider& link);
+    /// Ends a vertex's anchor, if it has one; throws std::out_of_range.
+    void unanchor(int vertex);
 
     /// Asleep it stands still and costs nothing until something happens to it, or activate() is called.
     bool isAsleep() const;
@@ -137,6 +141,8 @@ class ShellBody {
     Points m_ahead;  ///< where vertices that touch would be taken along to; empty until one does [m]
     void publish();  ///< copies positions for drawing
     void anchorTo(int vertex, btCollisionObject& body);
+    void requireVertex(int vertex, const char* what) const;  ///< throws std::out_of_range
+    void endAnchorsOfHeld();                                 ///< of what is pinned or guided
     void fallAsleep();
     BodyContact describe(const ContactImpulse& impulse, btCollisionObject& object) const;
     std::unique_ptr<ShellRest> m_rest;

@@ -1,0 +1,127 @@
+// Vertices that are tied to bodies.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <numeric>
+#include <vector>
+
+#include "support/BulletScene.h"
+
+namespace jacket::bullet::testing {
+namespace {
+
+using jacket::testing::Scene;
+using jacket::testing::totalMomentum;
+
+constexpr int kMiddle = 24;
+
+/// A free sheet whose middle is near two balls, one of which flies away.
+struct TwoBalls : Scene<> {
+    btRigidBody& flying;
+    btRigidBody& resting;
+    ShellBody& sheet;
+
+    TwoBalls()
+        : Scene(0.0),
+          flying(addSphere(0.05, 1.0, btVector3(btScalar(-0.2), btScalar(-0.3), 0))),
+          resting(addSphere(0.05, 1.0, btVector3(btScalar(0.2), btScalar(-0.3), 0))),
+          sheet(shells->add(squareSheet(1, 6), trampolineCloth())) {
+        flying.setLinearVelocity(btVector3(0, -1, 0));
+    }
+    /// Where the middle is in the frame of a body.
+    btVector3 middleIn(const btRigidBody& body) const {
+        return body.getWorldTransform().inverse() * sheet.positions()[kMiddle];
+    }
+    /// Runs on, while the middle has to keep its place `local` in the body's frame, and the scene its momentum.
+    void expectTied(const btRigidBody& body, const btVector3& local) {
+        const Vec3 before = totalMomentum(*this);
+        for (int i = 0; i < 60; ++i) {
+            step(1.0 / 120);
+            ASSERT_LT((middleIn(body) - local).length(), bulletTolerance(1e-6, 1e-4)) << "step " << i;
+            ASSERT_LT((totalMomentum(*this) - before).norm(), bulletTolerance(1e-9, 1e-5)) << "step " << i;
+        }
+    }
+    /// Runs on, while the middle has to leave its place in the body's frame.
+    void expectFree(const btRigidBody& body) {
+        const btVector3 local = middleIn(body);
+        run(0.5, 1.0 / 120);
+        EXPECT_GT((middleIn(body) - local).length(), 0.05);
+    }
+};
+
+TEST(Anchors, ASecondOneToTheSameBodyTakesTheFirstOnesPlace) {
+    TwoBalls scene;
+    scene.sheet.anchor(kMiddle, scene.flying);
+    scene.sheet.anchor(kMiddle, scene.flying);
+    scene.expectTied(scene.flying, scene.middleIn(scene.flying));
+    EXPECT_GT(scene.flying.getLinearVelocity().y(), -0.99);  // the sheet hangs on it
+}
+
+TEST(Anchors, AnotherOneTiesTheVertexAgainWhereItIs) {
+    TwoBalls scene;
+    scene.sheet.anchor(kMiddle, scene.flying);
+    scene.run(0.25, 1.0 / 120);
+    scene.sheet.anchor(kMiddle, scene.resting);
+    const btVector3 local = scene.middleIn(scene.resting);
+    scene.step(1.0 / 120);  // still with the velocities of the last solve
+    scene.expectTied(scene.resting, local);
+    scene.expectFree(scene.flying);
+}
+
+TEST(Anchors, EndWhenAsked) {
+    TwoBalls scene;
+    scene.sheet.anchor(kMiddle, scene.flying);
+    scene.run(0.25, 1.0 / 120);
+    scene.sheet.unanchor(kMiddle);
+    scene.sheet.unanchor(kMiddle);  // has none: nothing happens
+    scene.step(1.0 / 120);
+    const btVector3 velocity = scene.flying.getLinearVelocity();
+    scene.run(0.1, 1.0 / 120);
+    EXPECT_EQ(scene.flying.getLinearVelocity(), velocity);
+    EXPECT_THROW(scene.sheet.unanchor(49), std::out_of_range);
+    EXPECT_THROW(scene.sheet.anchor(-1, scene.flying), std::out_of_range);
+}
+
+void clampHalf(ShellBody& sheet) {
+    std::vector<int> vertices(28);  // up to the row of the middle
+    std::iota(vertices.begin(), vertices.end(), 0);
+    sheet.clamp(vertices);
+}
+
+/// What takes over from an anchor.
+class HeldAnew : public ::testing::TestWithParam<std::function<void(ShellBody&)>> {};
+
+TEST_P(HeldAnew, EndsTheAnchor) {
+    TwoBalls scene;
+    scene.sheet.anchor(kMiddle, scene.flying);
+    GetParam()(scene.sheet);
+    const Vec3 place = scene.sheet.shell().positions().col(kMiddle);
+    scene.run(0.25, 1.0 / 120);
+    EXPECT_EQ(scene.flying.getLinearVelocity(), btVector3(0, -1, 0));
+    EXPECT_LT((scene.sheet.shell().positions().col(kMiddle) - place).norm(), 1e-12);
+    scene.sheet.unpin(kMiddle);
+    scene.run(0.25, 1.0 / 120);  // nothing holds it any more
+    EXPECT_EQ(scene.flying.getLinearVelocity(), btVector3(0, -1, 0));
+}
+INSTANTIATE_TEST_SUITE_P(Ways, HeldAnew,
+                         ::testing::Values([](ShellBody& sheet) { sheet.pin(kMiddle); },
+                                           [](ShellBody& sheet) { sheet.movePin(kMiddle, btVector3(0, 0, 0)); },
+                                           [](ShellBody& sheet) { sheet.shell().pin(kMiddle); },
+                                           [](ShellBody& sheet) { sheet.shell().guide(kMiddle, Vec3(0, 1, 0)); },
+                                           clampHalf));
+
+TEST(Anchors, EndPinsAndGuides) {
+    for (const bool isGuided : {false, true}) {
+        TwoBalls scene;
+        if (isGuided)
+            scene.sheet.shell().guide(kMiddle, Vec3(0, 1, 0));
+        else
+            scene.sheet.pin(kMiddle);
+        scene.sheet.anchor(kMiddle, scene.flying);
+        EXPECT_EQ(scene.sheet.shell().pinCount(), 0);
+        scene.expectTied(scene.flying, scene.middleIn(scene.flying));
+    }
+}
+
+}  // namespace
+}  // namespace jacket::bullet::testing
