@@ -122,11 +122,12 @@ void ShellBody::anchorTo(int vertex, btCollisionObject& body) {
     unanchor(vertex);  // two would be two equations for the same unknowns
     if (m_shell.isPinned(vertex) || m_shell.isGuided(vertex)) m_shell.unpin(vertex);
     m_anchors.push_back({vertex, &body, body.getWorldTransform().inverse() * m_positions[vertex]});
+    activate();
 }
 
 void ShellBody::unanchor(int vertex) {
     requireVertex(vertex, "ShellBody::unanchor");
-    std::erase_if(m_anchors, [&](const Anchor& anchor) { return anchor.vertex == vertex; });
+    if (std::erase_if(m_anchors, [&](const Anchor& anchor) { return anchor.vertex == vertex; }) > 0) activate();
 }
 
 void ShellBody::endAnchorsOfHeld() {

@@ -123,5 +123,34 @@ TEST(Anchors, EndPinsAndGuides) {
     }
 }
 
+/// A sheet that sleeps on the floor is tied to a box that flies by, and later let go.
+TEST(Anchors, WakeASleepingShell) {
+    Scene scene;
+    scene.addFloor();
+    TriangleMesh mesh = squareSheet(0.6, 6);
+    mesh.positions.row(1).array() += 2e-3;
+    auto& sheet = scene.shells->add(mesh, trampolineCloth());
+    scene.run(4.0, kStep);
+    ASSERT_TRUE(sheet.isAsleep());
+    sheet.unanchor(48);
+    ASSERT_TRUE(sheet.isAsleep());  // nothing was tied
+    auto& box = scene.addBox(btVector3(btScalar(0.05), btScalar(0.05), btScalar(0.05)), 0.5, btVector3(2, 1, 0));
+    box.setLinearVelocity(btVector3(3, 0, 0));
+    box.setAngularFactor(btVector3(0, 0, 0));  // 2 m away, its tumbling would whirl the vertex about
+    sheet.anchor(48, box);
+    const btVector3 local = box.getWorldTransform().inverse() * sheet.positions()[48];
+    for (int i = 0; i < 60; ++i) {
+        scene.step(kStep);
+        if (i == 0) continue;  // the shell did not know of it before its first solve
+        const btVector3 tied = box.getWorldTransform() * local;
+        ASSERT_LT((sheet.positions()[48] - tied).length(), bulletTolerance(1e-6, 1e-4)) << "step " << i;
+    }
+    EXPECT_GT(sheet.positions()[24].x(), 0.1);  // dragged along
+    scene.run(10.0, kStep);
+    ASSERT_TRUE(sheet.isAsleep());
+    sheet.unanchor(48);
+    EXPECT_FALSE(sheet.isAsleep());
+}
+
 }  // namespace
 }  // namespace jacket::bullet::testing
