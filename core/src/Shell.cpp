@@ -6,6 +6,7 @@
 
 #include "ShellAssembly.h"
 #include "jacket/Island.h"
+#include "jacket/models/StencilTools.h"
 
 namespace jacket {
 namespace {
@@ -38,7 +39,18 @@ void requireMaterials(const std::vector<ShellMaterial>& materials, const std::ve
                                         std::to_string(ofTriangle[t]));
 }
 
+void requireWindFactor(double value, const char* field) {
+    requireParameter(value >= 0.0 && std::isfinite(value), field, ">= 0 and finite", value);
+}
+
 }  // namespace
+
+void validate(const Wind& wind) {
+    requireFinite(wind.velocity, "Wind.velocity [m/s]");
+    requireWindFactor(wind.airDensity, "Wind.airDensity [kg/m^3]");
+    requireWindFactor(wind.normalDrag, "Wind.normalDrag [-]");
+    requireWindFactor(wind.tangentialDrag, "Wind.tangentialDrag [-]");
+}
 
 Shell::Shell(const TriangleMesh& mesh, const ShellMaterial& material, const ShellSettings& settings)
     : Shell(mesh, std::vector<ShellMaterial>{material}, {}, settings) {}

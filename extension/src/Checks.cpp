@@ -45,6 +45,7 @@ const char* defectOf(const btCollisionObject& object) {
     if (!body) return nullptr;
     if (!isFinite(body->getLinearVelocity()) || !isFinite(body->getAngularVelocity())) return "velocity is not finite";
     if (!isFinite(body->getTotalForce()) || !isFinite(body->getTotalTorque())) return "force is not finite";
+    if (!isFinite(body->getGravity())) return "gravity is not finite";
     const btVector3& inertia = body->getInvInertiaDiagLocal();
     if (!std::isfinite(body->getInvMass()) || body->getInvMass() < btScalar(0) || !isFinite(inertia) ||
         !isFinite(body->getInvInertiaTensorWorld()) || inertia[inertia.minAxis()] < btScalar(0))
@@ -61,6 +62,12 @@ ShellChecks::Known& ShellChecks::known(const ShellBody& shell) {
         m_warnings.push_back(nameOf(shell) + ": contact thickness " + millimetres(shell.contactThickness()) +
                              " is larger than the edges (" + millimetres(edge) + " on average)");
     return entry->second;
+}
+
+void ShellChecks::lookAtGravity(const btVector3& gravity) {
+    if (isFinite(gravity) || m_warnedOfGravity) return;
+    m_warnedOfGravity = true;
+    m_warnings.push_back("shells keep the last finite gravity while the world's is not finite");
 }
 
 void ShellChecks::look(const Island& island) {

@@ -15,10 +15,11 @@ struct Island;
 /// What makes a body unusable for a solve, e.g. "position is not finite"; null: nothing.
 const char* defectOf(const btCollisionObject& object);
 
-/// Sizes that hardly are what the user wants, told once per shell and by its name.
+/// Sizes that hardly are what the user wants, told once per shell and by its name, and gravity that cannot be used.
 class ShellChecks {
   public:
     void look(const Island& island);
+    void lookAtGravity(const btVector3& gravity);
     void forget(const ShellBody& shell) { m_known.erase(&shell); }
     std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }
 
@@ -29,6 +30,7 @@ class ShellChecks {
     };
     Known& known(const ShellBody& shell);
     std::map<const ShellBody*, Known> m_known;
+    bool m_warnedOfGravity = false;
     std::vector<std::string> m_warnings;
 };
 

@@ -3,6 +3,7 @@
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -10,16 +11,18 @@
 #include "ManifoldPoint.h"
 #include "ShellProxy.h"
 #include "Sleepers.h"
+#include "jacket/models/StencilTools.h"
 
 namespace jacket::bullet {
 namespace {
 
 ShellSettings settingsOf(const ShellOptions& o) {
-    if (!(o.friction >= 0.0))
-        throw std::invalid_argument("ShellOptions.friction must be >= 0, got " + std::to_string(o.friction));
-    if (!(o.restitution >= 0.0 && o.restitution <= 1.0))
-        throw std::invalid_argument("ShellOptions.restitution must be from 0 to 1, got " +
-                                    std::to_string(o.restitution));
+    requireParameter(o.friction >= 0.0 && std::isfinite(o.friction), "ShellOptions.friction", ">= 0 and finite",
+                     o.friction);
+    requireParameter(o.restitution >= 0.0 && o.restitution <= 1.0, "ShellOptions.restitution", "from 0 to 1",
+                     o.restitution);
+    requireParameter(std::isfinite(o.contactThickness), "ShellOptions.contactThickness [m]", "finite",
+                     o.contactThickness);
     return {.membrane = o.membrane,
             .bending = o.bending,
             .integrator = o.integrator,

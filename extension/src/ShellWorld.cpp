@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <map>
 #include <memory_resource>
 #include <optional>
@@ -82,6 +83,12 @@ void moveAnew(btCollisionWorld& world, const Obstacle& obstacle, const Vec6& sol
     world.updateSingleAabb(body);
 }
 
+/// The world's gravity, or `last` while that is not finite: no shell could follow it.
+btVector3 usableGravity(const btDynamicsWorld& world, const btVector3& last) {
+    const btVector3 gravity = world.getGravity();
+    return fromBullet(gravity).allFinite() ? gravity : last;
+}
+
 /// Fastest that any point of any moving object goes, roughly: how far bounds must reach ahead [m/s].
 double fastestObject(const btCollisionWorld& world) {
     double speed = 0.0;
@@ -119,7 +126,7 @@ struct ShellWorld::Impl {
     ShellChecks checks;
     Wind wind;
     bool hasWind = false, windChanged = false;
-    btVector3 gravity{0, 0, 0};        ///< of the last solve
+    btVector3 gravity{0, 0, 0};        ///< of the last solve, finite
     std::unique_ptr<WorkerTeam> team;  ///< none: one thread
 };
 
@@ -165,6 +172,7 @@ ShellBody* ShellWorld::find(const btCollisionObject& object) {
 }
 
 void ShellWorld::setWind(const Wind& wind) {
+    validate(wind);
     m_impl->wind = wind;
     m_impl->hasWind = m_impl->windChanged = true;
 }
@@ -195,7 +203,7 @@ std::vector<std::string> ShellWorld::takeWarnings() {
 /// shells move along with the velocities of the same solve, so that shells and bodies are drawn at the same instant;
 /// then the next solve looks at this configuration, and its impulses enter Bullet's next solve.
 void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
-    if (!(h > btScalar(0))) return;
+    if (!(h > btScalar(0) && std::isfinite(h))) return;
     alterBodies(*world, false);
     if (m_shells.empty()) return forgetPushes(*world);
     const double start = seconds();
@@ -234,7 +242,8 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
 
 /// Gravity has changed since velocities were solved for: Bullet's bodies have just fallen with the new one.
 void ShellWorld::followGravity(double h) {
-    const btVector3 before = std::exchange(m_impl->gravity, m_world.getGravity());
+    m_impl->checks.lookAtGravity(m_world.getGravity());
+    const btVector3 before = std::exchange(m_impl->gravity, usableGravity(m_world, m_impl->gravity));
     if (before == m_impl->gravity) return;
     for (const auto& body : m_shells) {
         if (!body->m_hasVelocity || body->isAsleep()) continue;
@@ -309,10 +318,9 @@ void ShellWorld::solveIsland(Island& island, double h) {
     for (const Obstacle& obstacle : island.obstacles) coupled.push_back(obstacle.body);
     ShellContacts contacts(bodies, island.obstacles, island.pairs, m_impl->contactMemory, m_impl->team.get());
     TimedDetector timed(contacts, m_report.secondsContact);
-    const Vec3 gravity = fromBullet(m_world.getGravity());
     IslandInput input;
     input.h = h;
-    input.gravity = gravity;
+    input.gravity = fromBullet(m_impl->gravity);
     input.wind = m_impl->hasWind ? &m_impl->wind : nullptr;
     input.shells = shells;
     input.bodies = coupled;
@@ -348,7 +356,7 @@ void ShellWorld::accept(Island& island, const StepReport& report, std::span<cons
     for (ShellBody* shell : island.shells) {
         shell->m_contacts.clear();
         shell->m_hasVelocity = report.finite;  // a rejected step: stands still, and is solved afresh
-        shell->m_pendingGravity = h * fromBullet(m_world.getGravity());
+        shell->m_pendingGravity = h * fromBullet(m_impl->gravity);
     }
     if (!report.finite) return;
     const auto endOf = [&](int b) { return moved(island.obstacles[b].start, coupled[b].motion, 1.0); };
@@ -376,7 +384,7 @@ void ShellWorld::accept(Island& island, const StepReport& report, std::span<cons
 
 void ShellWorld::react(btCollisionObject& object, const CoupledBody& coupled) {
     if (object.isStaticOrKinematicObject() || coupled.impulse.isZero(0.0)) return;
-    const double still = 0.02 * double(m_world.getGravity().length()) / 60.0;
+    const double still = 0.02 * double(m_impl->gravity.length()) / 60.0;
     if (auto* link = btMultiBodyLinkCollider::upcast(&object)) {
         pushLink(*link, coupled.impulse, still);
         return;
@@ -421,8 +429,9 @@ void ShellWorld::updateBounds(ShellBody& shell, double fastest, double h) {
     const Points& x = shell.m_shell.positions();
     const Points& v = shell.m_shell.velocities();
     const Vec3 lower = x.rowwise().minCoeff(), upper = x.rowwise().maxCoeff();
-    const double ahead = 2.0 * h * (fastest + v.colwise().norm().maxCoeff()) +
-                         4.0 * h * h * double(m_world.getGravity().length()) + shell.contactThickness() + 1e-3;
+    const double gravity = double(usableGravity(m_world, m_impl->gravity).length());
+    const double ahead =
+        2.0 * h * (fastest + v.colwise().norm().maxCoeff()) + 4.0 * h * h * gravity + shell.contactThickness() + 1e-3;
     shell.m_proxy->keepHidden();
     shell.m_proxy->shape().setBounds(toBullet(lower), toBullet(upper), btScalar(ahead));
     shell.m_rest->boundsSpeed = fastest;

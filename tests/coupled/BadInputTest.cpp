@@ -4,6 +4,8 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <stdexcept>
+#include <string>
 
 #include "support/BulletScene.h"
 
@@ -106,6 +108,83 @@ TEST(BadInput, MassesOfMaterialsMustBePositiveAndFinite) {
         EXPECT_THROW(scene.shells->add(squareSheet(1, 4), cloth), std::invalid_argument) << density;
     }
     EXPECT_EQ(scene.world.getNumCollisionObjects(), 0);
+}
+
+/// That a sheet with these options is refused, by the option's name.
+void expectRefused(const ShellOptions& options, const std::string& name) {
+    Scene scene;
+    try {
+        scene.shells->add(squareSheet(1, 4), trampolineCloth(), options);
+        ADD_FAILURE() << name << " was accepted";
+    } catch (const std::invalid_argument& error) {
+        EXPECT_NE(std::string(error.what()).find(name + " "), std::string::npos) << error.what();
+    }
+    EXPECT_EQ(scene.shells->size(), 0);
+}
+
+TEST(BadInput, NumbersOfOptionsMustBeUsable) {
+    for (const double value : {std::nan(""), double(kInfinity), -double(kInfinity)}) {
+        expectRefused({.contactThickness = value}, "ShellOptions.contactThickness");
+        expectRefused({.friction = value}, "ShellOptions.friction");
+        expectRefused({.restitution = value}, "ShellOptions.restitution");
+        expectRefused({.tolerance = value}, "ShellSettings.tolerance");
+    }
+    expectRefused({.friction = -0.1}, "ShellOptions.friction");
+    expectRefused({.restitution = 1.1}, "ShellOptions.restitution");
+    expectRefused({.tolerance = 0.0}, "ShellSettings.tolerance");
+    expectRefused({.maxIterations = 0}, "ShellSettings.maxIterations");
+}
+
+TEST(BadInput, NumbersOfWindMustBeUsable) {
+    Scene scene;
+    for (const double value : {std::nan(""), double(kInfinity), -1.0}) {
+        EXPECT_THROW(scene.shells->setWind({.airDensity = value}), std::invalid_argument) << value;
+        EXPECT_THROW(scene.shells->setWind({.normalDrag = value}), std::invalid_argument) << value;
+        EXPECT_THROW(scene.shells->setWind({.tangentialDrag = value}), std::invalid_argument) << value;
+    }
+    EXPECT_THROW(scene.shells->setWind({.velocity = {0, std::nan(""), 0}}), std::invalid_argument);
+    EXPECT_THROW(scene.shells->setWind({.velocity = {0, 0, double(kInfinity)}}), std::invalid_argument);
+    auto& sheet = scene.shells->add(squareSheet(1, 4), trampolineCloth());
+    scene.run(0.1, kStep);  // nothing of it has stayed
+    const Vec3 fallen = sheet.shell().positions().col(0) - squareSheet(1, 4).positions.col(0);
+    EXPECT_NEAR(fallen.x(), 0.0, 1e-12);
+    EXPECT_LT(fallen.y(), 0.0);
+}
+
+/// The shell falls on as it did; what Bullet does to bodies is not looked at.
+TEST(BadInput, GravityThatIsNotFiniteIsIgnoredAndNamedOnce) {
+    Scene scene, usual;
+    auto& sheet = scene.shells->add(squareSheet(1, 4), trampolineCloth());
+    auto& expected = usual.shells->add(squareSheet(1, 4), trampolineCloth());
+    usual.run(0.5, kStep);
+    scene.run(0.2, kStep);
+    for (const btScalar bad : {kNaN, kInfinity}) {
+        scene.world.setGravity(btVector3(0, bad, 0));
+        ASSERT_NO_THROW(scene.run(0.1, kStep));
+    }
+    scene.world.setGravity(usual.world.getGravity());
+    scene.run(0.1, kStep);
+    EXPECT_EQ(sheet.shell().positions(), expected.shell().positions());
+    EXPECT_EQ(scene.shells->lastStep().rejectedSteps, 0);
+    const auto warnings = scene.shells->takeWarnings();
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find("gravity"), std::string::npos) << warnings[0];
+}
+
+TEST(BadInput, StepsWithoutAFinitePositiveLengthMoveNoShell) {
+    Scene scene;
+    scene.addFloor(-0.05);
+    auto& sheet = scene.shells->add(squareSheet(1, 4), trampolineCloth());
+    scene.run(0.05, kStep);
+    const Points before = sheet.shell().positions();
+    for (const btScalar h : {kInfinity, kNaN, btScalar(0), btScalar(-0.1)}) {
+        ASSERT_NO_THROW(scene.shells->updateAction(&scene.world, h)) << h;
+        EXPECT_EQ(sheet.shell().positions(), before) << h;
+    }
+    ASSERT_NO_THROW(scene.world.stepSimulation(kInfinity, 0, kInfinity));
+    scene.run(0.5, kStep);
+    EXPECT_TRUE(sheet.shell().positions().allFinite());
+    EXPECT_NEAR(sheet.positions()[0].y(), -0.05, 2e-3);  // on the floor
 }
 
 TEST(BadInput, WarnsOnceOfAContactThicknessLargerThanEdges) {

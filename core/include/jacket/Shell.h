@@ -48,6 +48,9 @@ struct Wind {
     double tangentialDrag = 0.02;  ///< C_t [-]
 };
 
+/// Throws std::invalid_argument naming the field, unless the velocity is finite and the rest finite and >= 0.
+void validate(const Wind& wind);
+
 /// Stored and moving energy of one shell, and what plastic flow has turned into heat so far [J].
 struct ShellEnergy {
     double kinetic = 0.0, membrane = 0.0, bending = 0.0, plasticWork = 0.0;
