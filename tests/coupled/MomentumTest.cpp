@@ -1,6 +1,8 @@
 // What nobody holds keeps its momentum.
+#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 #include <gtest/gtest.h>
 
+#include "Worlds.h"
 #include "support/BulletScene.h"
 
 namespace jacket::bullet::testing {
@@ -85,6 +87,36 @@ TEST(Momentum, ContactItselfKeepsAngularMomentum) {
     ASSERT_TRUE(touched);
     const double drift = (totalAngularMomentum(scene) - before).norm() / before.norm();
     EXPECT_LT(drift, 1e-4);
+}
+
+/// A multibody of one link flies into a sheet.
+TEST(Momentum, MultibodiesTakeWhatSheetsLose) {
+    Scene<btMultiBodyDynamicsWorld> scene(0.0);
+    auto& sheet = scene.shells->add(squareSheet(1, 10), trampolineCloth());
+    btSphereShape shape(btScalar(0.1));
+    btMultiBody ball(0, btScalar(0.5), btVector3(btScalar(0.002), btScalar(0.002), btScalar(0.002)), false, false);
+    ball.setLinearDamping(0);
+    ball.setAngularDamping(0);
+    ball.setBasePos(btVector3(0, btScalar(0.2), 0));
+    ball.finalizeMultiDof();
+    btMultiBodyLinkCollider collider(&ball, -1);
+    collider.setCollisionShape(&shape);
+    collider.setWorldTransform(ball.getBaseWorldTransform());
+    ball.setBaseCollider(&collider);
+    scene.world.addCollisionObject(&collider);
+    scene.world.addMultiBody(&ball);
+    ball.setBaseVel(btVector3(0, -3, 0));
+    EXPECT_LT((totalMomentum(scene) - Vec3(0, -1.5, 0)).norm(), bulletTolerance(1e-12, 1e-6));
+    bool touched = false;
+    for (int i = 0; i < 60; ++i) {
+        scene.step(1.0 / 120);
+        touched = touched || !sheet.contacts().empty();
+        ASSERT_LT((totalMomentum(scene) - Vec3(0, -1.5, 0)).norm(), bulletTolerance(1e-9, 1e-5)) << "step " << i;
+    }
+    EXPECT_TRUE(touched);
+    EXPECT_GT(ball.getBaseVel().y(), -2.9);
+    scene.world.removeMultiBody(&ball);
+    scene.world.removeCollisionObject(&collider);
 }
 
 /// Tied, not touching: the anchor hands over as much as it takes.

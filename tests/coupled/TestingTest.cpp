@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "Worlds.h"
 #include "support/BulletScene.h"
 
 namespace jacket::bullet::testing {
@@ -77,6 +78,83 @@ TEST(Testing, EnergyGainSeesAKick) {
     scene.world.addAction(&kick);
     EXPECT_NEAR(energyGain(scene, 0.1, 1.0 / 60), 0.5 * 2.0 * (9 - 1), bulletTolerance(1e-9, 1e-4));
     scene.world.removeAction(&kick);
+}
+
+/// A base and a link on a hinge about z, 1 kg and 0.5 kg, whose centre is 0.4 m from the hinge, that from the base's.
+struct TwoLinks : Scene<btMultiBodyDynamicsWorld> {
+    btMultiBody body{1, 1, btVector3(btScalar(0.01), btScalar(0.02), btScalar(0.03)), false, false};
+
+    explicit TwoLinks(double gravity = 0.0) : Scene(gravity) {
+        body.setupRevolute(0, btScalar(0.5), btVector3(btScalar(0.004), btScalar(0.005), btScalar(0.006)), -1,
+                           btQuaternion::getIdentity(), btVector3(0, 0, 1), btVector3(btScalar(0.4), 0, 0),
+                           btVector3(btScalar(0.4), 0, 0));
+        body.setLinearDamping(0);
+        body.setAngularDamping(0);
+        body.setBasePos(btVector3(0, 3, 0));
+        body.finalizeMultiDof();
+        world.addMultiBody(&body);
+    }
+    ~TwoLinks() { world.removeMultiBody(&body); }
+};
+
+TEST(Testing, LinksOfMultibodiesCount) {
+    TwoLinks scene(-9.81);
+    scene.body.setBaseVel(btVector3(1, 0, 2));
+    scene.body.setBaseOmega(btVector3(0, 0, 3));
+    scene.body.setJointVel(0, 2);
+    const Vec3 base(1, 0, 2), link = base + Vec3(0, 0.4 * 3 + 0.4 * 5, 0);  // its own spin: 3 + 2
+    const Vec3 momentum = base + 0.5 * link;
+    EXPECT_LT((totalMomentum(scene) - momentum).norm(), bulletTolerance(1e-12, 1e-5));
+    const Vec3 turning =
+        Vec3(0, 3, 0).cross(base) + Vec3(0.8, 3, 0).cross(0.5 * link) + Vec3(0, 0, 0.03 * 3 + 0.006 * 5);
+    EXPECT_LT((totalAngularMomentum(scene) - turning).norm(), bulletTolerance(1e-12, 1e-5));
+    const double kinetic = 0.5 * base.squaredNorm() + 0.25 * link.squaredNorm() + 0.5 * (0.03 * 9 + 0.006 * 25);
+    EXPECT_NEAR(energy(scene).kineticOfBodies, kinetic, bulletTolerance(1e-12, 1e-5));
+    EXPECT_NEAR(energy(scene).potentialOfBodies, 1.5 * 9.81 * 3, bulletTolerance(1e-9, 1e-4));
+}
+
+TEST(Testing, BasesThatCannotMoveDoNotCount) {
+    Scene<btMultiBodyDynamicsWorld> scene;
+    btMultiBody fixed(0, 1, btVector3(1, 1, 1), true, false);
+    fixed.setBasePos(btVector3(0, 3, 0));
+    fixed.finalizeMultiDof();
+    scene.world.addMultiBody(&fixed);
+    EXPECT_EQ(energy(scene).total(), 0.0);
+    scene.world.removeMultiBody(&fixed);
+}
+
+/// In free flight, turned any way, while the link turns against its base.
+TEST(Testing, MultibodiesKeepMomentumAndEnergyOfFlight) {
+    TwoLinks scene;
+    scene.body.setWorldToBaseRot(btQuaternion(btVector3(1, 2, 3).normalized(), btScalar(0.7)));
+    scene.body.setBaseVel(btVector3(1, 0, 2));
+    scene.body.setBaseOmega(btVector3(btScalar(0.5), btScalar(-0.3), 1));
+    scene.body.setJointVel(0, 2);
+    const Vec3 linear = totalMomentum(scene), angular = totalAngularMomentum(scene);
+    const double start = energy(scene).total();
+    scene.run(0.5, 1e-4);
+    EXPECT_LT((totalMomentum(scene) - linear).norm(), 1e-2);  // Bullet's integration is of first order
+    EXPECT_LT((totalAngularMomentum(scene) - angular).norm(), 1e-2);
+    EXPECT_NEAR(energy(scene).total(), start, 1e-2);
+}
+
+TEST(Testing, EnergyGainSeesMultibodiesFly) {
+    TwoLinks scene(-9.81);
+    EXPECT_LT(energyGain(scene, 0.5, 1.0 / 240), bulletTolerance(1e-6, 1e-3));
+    EXPECT_GT(energy(scene).kineticOfBodies, 0.99 * 0.5 * 1.5 * std::pow(9.81 * 0.5, 2));
+}
+
+TEST(Testing, ReplaysCompareMultibodies) {
+    double start = 1.0;
+    const auto run = [&](bool isSame) {
+        TwoLinks scene;
+        scene.body.setJointVel(0, btScalar(start));
+        if (!isSame) start = std::nextafter(btScalar(start), btScalar(2));
+        scene.run(0.1, 1.0 / 60);
+        return stateOf(scene);
+    };
+    EXPECT_TRUE(replayEqual([&] { return run(true); }));
+    EXPECT_FALSE(replayEqual([&] { return run(false); }));
 }
 
 /// A stretched sheet stores what the plane-stress plate does.

@@ -1,4 +1,5 @@
 #pragma once
+#include <BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h>
 #include <btBulletDynamicsCommon.h>
 
 #include <algorithm>
@@ -108,6 +109,60 @@ inline Mat3 inertia(const btRigidBody& body) {
     return turn * diagonal.asDiagonal() * turn.transpose();
 }
 
+/// A dynamic rigid body, or a link (or the base) of a multibody that can move.
+struct MovingPart {
+    double mass = 0.0;  ///< [kg]
+    Vec3 centre;        ///< of mass [m]
+    Vec3 velocity;      ///< of the centre of mass [m/s]
+    Vec3 spin;          ///< [rad/s]
+    Mat3 inertia;       ///< about the centre of mass, in the world's axes [kg m^2]
+    Vec3 gravity;       ///< [m/s^2]
+    double kinetic() const { return 0.5 * mass * velocity.squaredNorm() + 0.5 * spin.dot(inertia * spin); }
+};
+
+inline MovingPart movingPart(const btRigidBody& body) {
+    return {.mass = 1.0 / double(body.getInvMass()),
+            .centre = toVec3(body.getWorldTransform().getOrigin()),
+            .velocity = toVec3(body.getLinearVelocity()),
+            .spin = toVec3(body.getAngularVelocity()),
+            .inertia = inertia(body),
+            .gravity = toVec3(body.getGravity())};
+}
+
+/// Of link `link`, -1 being the base; velocity and spin in the link's axes.
+inline MovingPart movingPart(const btMultiBody& body, int link, const btVector3& velocity, const btVector3& spin,
+                             const Vec3& gravity) {
+    const Mat3 turn = toMat3(body.localFrameToWorld(link, btMatrix3x3::getIdentity()));
+    const Vec3 diagonal = toVec3(link < 0 ? body.getBaseInertia() : body.getLinkInertia(link));
+    return {.mass = double(link < 0 ? body.getBaseMass() : body.getLinkMass(link)),
+            .centre = toVec3(body.localPosToWorld(link, btVector3(0, 0, 0))),
+            .velocity = turn * toVec3(velocity),
+            .spin = turn * toVec3(spin),
+            .inertia = turn * diagonal.asDiagonal() * turn.transpose(),
+            .gravity = gravity};
+}
+
+/// Calls visit(multibody, the world's gravity [m/s^2]); worlds of other kinds have no multibodies.
+template <class Visit>
+void forEachMultiBody(const btCollisionWorld& world, Visit visit) {
+    const auto* dynamics = dynamic_cast<const btMultiBodyDynamicsWorld*>(&world);
+    for (int i = 0; dynamics && i < dynamics->getNumMultibodies(); ++i)
+        visit(*dynamics->getMultiBody(i), toVec3(dynamics->getGravity()));
+}
+
+/// Calls visit(MovingPart) for everything but shells that momentum and energy are of.
+template <class Visit>
+void forEachMovingPart(const btCollisionWorld& world, Visit visit) {
+    forEachDynamicBody(world, [&](const btRigidBody& body) { visit(movingPart(body)); });
+    forEachMultiBody(world, [&](const btMultiBody& body, const Vec3& gravity) {
+        std::vector<btVector3> spins(body.getNumLinks() + 1), velocities(body.getNumLinks() + 1);
+        body.compTreeLinkVelocities(spins.data(), velocities.data());
+        for (int link = -1; link < body.getNumLinks(); ++link)
+            if (link < 0 ? !body.isBaseStaticOrKinematic() : !body.isLinkAndAllAncestorsKinematic(link))
+                visit(movingPart(body, link, velocities[link + 1], spins[link + 1], gravity));
+    });
+}
+
 /// Gravity of the coming substep that a shell's velocities hold already and Bullet's bodies do not [m/s].
 inline Vec3 pendingGravity(const bullet::ShellBody& shell) {
     return (shell.shell().linearMomentum() - toVec3(shell.linearMomentum())) / shell.shell().masses().sum();
@@ -150,12 +205,12 @@ inline double signedDistance(const btCollisionShape& shape, const Vec3& p) {
 
 }  // namespace detail
 
-/// Linear momentum of all shells and dynamic bodies, at one instant: before the gravity of the coming substep [N s].
+/// Linear momentum of all shells, dynamic bodies and links of multibodies, at one instant: before the gravity of the
+/// coming substep [N s].
 inline Vec3 totalMomentum(const btCollisionWorld& world, const bullet::ShellWorld& shells) {
     Vec3 sum = Vec3::Zero();
     for (int i = 0; i < shells.size(); ++i) sum += toVec3(shells[i].linearMomentum());
-    detail::forEachDynamicBody(
-        world, [&](const btRigidBody& body) { sum += toVec3(body.getLinearVelocity()) / double(body.getInvMass()); });
+    detail::forEachMovingPart(world, [&](const detail::MovingPart& part) { sum += part.mass * part.velocity; });
     return sum;
 }
 
@@ -167,16 +222,15 @@ inline Vec3 totalAngularMomentum(const btCollisionWorld& world, const bullet::Sh
         const Vec3 firstMoment = shell.positions() * shell.masses();
         sum += shell.angularMomentum(Vec3::Zero()) - firstMoment.cross(detail::pendingGravity(shells[i]));
     }
-    detail::forEachDynamicBody(world, [&](const btRigidBody& body) {
-        const Vec3 momentum = toVec3(body.getLinearVelocity()) / double(body.getInvMass());
-        sum += toVec3(body.getWorldTransform().getOrigin()).cross(momentum) +
-               detail::inertia(body) * toVec3(body.getAngularVelocity());
+    detail::forEachMovingPart(world, [&](const detail::MovingPart& part) {
+        sum += part.centre.cross(part.mass * part.velocity) + part.inertia * part.spin;
     });
     return sum;
 }
 
-/// Energy of all shells and dynamic bodies [J], at the instant of totalMomentum: whatever rests has the kinetic energy
-/// m (g h)^2 / 2 of the impulse that is to meet the coming gravity. Heights are measured from the origin.
+/// Energy of all shells, dynamic bodies and links of multibodies (which count as bodies) [J], at the instant of
+/// totalMomentum: whatever rests has the kinetic energy m (g h)^2 / 2 of the impulse that is to meet the coming
+/// gravity. Heights are measured from the origin.
 struct Energy {
     double kineticOfBodies = 0.0, kineticOfShells = 0.0;
     double potentialOfBodies = 0.0, potentialOfShells = 0.0;
@@ -202,12 +256,9 @@ inline Energy energy(const btDynamicsWorld& world, const bullet::ShellWorld& she
         sum.bending += stored.bending;
         sum.plasticWork += stored.plasticWork;
     }
-    detail::forEachDynamicBody(world, [&](const btRigidBody& body) {
-        const double mass = 1.0 / double(body.getInvMass());
-        const Vec3 spin = toVec3(body.getAngularVelocity());
-        sum.kineticOfBodies += 0.5 * mass * toVec3(body.getLinearVelocity()).squaredNorm();
-        sum.kineticOfBodies += 0.5 * spin.dot(detail::inertia(body) * spin);
-        sum.potentialOfBodies -= mass * toVec3(body.getGravity()).dot(toVec3(body.getWorldTransform().getOrigin()));
+    detail::forEachMovingPart(world, [&](const detail::MovingPart& part) {
+        sum.kineticOfBodies += part.kinetic();
+        sum.potentialOfBodies -= part.mass * part.gravity.dot(part.centre);
     });
     return sum;
 }
@@ -282,7 +333,8 @@ inline Vec3 contactImpulse(const bullet::ShellBody& shell) {
     return sum;
 }
 
-/// Positions and velocities of all shells, poses and velocities of all bodies: everything that a replay must repeat.
+/// Positions and velocities of all shells, poses and velocities of all bodies, bases and joints: everything that a
+/// replay must repeat.
 template <class World>
 std::vector<double> stateOf(const Scene<World>& scene) {
     std::vector<double> state;
@@ -297,6 +349,15 @@ std::vector<double> stateOf(const Scene<World>& scene) {
         for (int row = 0; row < 3; ++row) append(toVec3(body.getWorldTransform().getBasis()[row]));
         append(toVec3(body.getLinearVelocity()));
         append(toVec3(body.getAngularVelocity()));
+    });
+    detail::forEachMultiBody(scene.world, [&](const btMultiBody& body, const Vec3&) {
+        const btQuaternion& turn = body.getWorldToBaseRot();
+        append(toVec3(body.getBasePos()));
+        for (const btScalar part : {turn.x(), turn.y(), turn.z(), turn.w()}) state.push_back(double(part));
+        for (int link = 0; link < body.getNumLinks(); ++link)
+            for (int k = 0; k < body.getLink(link).m_posVarCount; ++k)
+                state.push_back(double(body.getJointPosMultiDof(link)[k]));
+        for (int k = 0; k < 6 + body.getNumDofs(); ++k) state.push_back(double(body.getVelocityVector()[k]));
     });
     return state;
 }
