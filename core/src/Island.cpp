@@ -975,8 +975,9 @@ void IslandSolver::Impl::balance(const IslandInput& input, std::vector<ContactIm
         pressed[contact.body] += impulse.norm();
     }
     std::pmr::vector<Vec3> onShells(input.shells.size(), Vec3::Zero(), &pool);
-    for (const auto& anchor : input.anchors) {
+    for (Anchor& anchor : input.anchors) {
         const Vec3 impulse = -impulseShare * unfiltered().col(offsets[anchor.shell] + anchor.vertex);
+        anchor.impulse = -impulse;
         onBodies[anchor.body] -= pointImpulse(impulse, anchor.point - input.bodies[anchor.body].position);
         onShells[anchor.shell] += impulse;
     }

@@ -35,6 +35,7 @@ StepParts::StepParts(const IslandInput& whole, const StepReport& failed)
     m_part.bodies = m_bodies;
     m_part.anchors = m_anchors;
     for (CoupledBody& body : whole.bodies) body.impulse = body.motion = Vec6::Zero();
+    for (Anchor& anchor : whole.anchors) anchor.impulse.setZero();
     shorten(failed);
 }
 
@@ -103,7 +104,11 @@ void StepParts::add(const StepReport& solved) {
 }
 
 void StepParts::moveBodies() {
-    for (Anchor& anchor : m_anchors) anchor.point = carriedAlong(anchor.point, m_bodies[anchor.body]);
+    for (std::size_t i = 0; i < m_anchors.size(); ++i) {
+        Anchor& anchor = m_anchors[i];
+        anchor.point = carriedAlong(anchor.point, m_bodies[anchor.body]);
+        m_whole.anchors[i].impulse += anchor.impulse;
+    }
     std::vector<Vec6> twists;
     for (std::size_t b = 0; b < m_bodies.size(); ++b) {
         CoupledBody &body = m_bodies[b], &whole = m_whole.bodies[b];

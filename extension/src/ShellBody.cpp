@@ -3,6 +3,7 @@
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -108,7 +109,7 @@ void ShellBody::clamp(const std::vector<int>& vertices, std::optional<btVector3>
 
 StaticReport ShellBody::settle(const btVector3& gravity, const StaticSettings& settings) {
     const StaticReport report = jacket::settle(m_shell, fromBullet(gravity), settings);
-    m_hasVelocity = false;
+    forgetSolvedVelocity();
     publish();
     return report;
 }
@@ -178,7 +179,30 @@ void ShellBody::setPositions(std::span<const btVector3> positions) {
 
 void ShellBody::setVelocity(const btVector3& velocity) {
     m_shell.setVelocities(fromBullet(velocity).replicate(1, vertexCount()));
+    forgetSolvedVelocity();
+}
+
+void ShellBody::forgetSolvedVelocity() {
     m_hasVelocity = false;
+    m_pendingGravity.setZero();
+}
+
+void ShellBody::forgetImpulses() {
+    m_contacts.clear();
+    for (Anchor& anchor : m_anchors) anchor.impulse.setZero();
+}
+
+void ShellBody::note(const jacket::Anchor& anchor) {
+    m_exchanged += anchor.impulse;
+    for (Anchor& own : m_anchors)
+        if (own.vertex == anchor.vertex) own.impulse = anchor.impulse;
+}
+
+Vec3 ShellBody::anchorImpulse(int vertex) const {
+    requireVertex(vertex, "ShellBody::anchorImpulse");
+    const auto found =
+        std::find_if(m_anchors.begin(), m_anchors.end(), [&](const Anchor& anchor) { return anchor.vertex == vertex; });
+    return found == m_anchors.end() ? Vec3(Vec3::Zero()) : found->impulse;
 }
 
 void ShellBody::note(const BodyContact& contact) {
@@ -188,11 +212,27 @@ void ShellBody::note(const BodyContact& contact) {
 }
 
 ShellLedger ShellBody::ledger() const {
-    return {m_shell.energy(), m_frictionLoss, fromBullet(linearMomentum()), m_exchanged};
+    ShellLedger ledger{m_shell.energy(), m_frictionLoss, momentum(), m_exchanged};
+    ledger.energy.kinetic = kinetic();
+    return ledger;
 }
 
 btVector3 ShellBody::linearMomentum() const {
-    return toBullet(Vec3(m_shell.linearMomentum() - m_pendingGravity * m_shell.masses().sum()));
+    return toBullet(momentum());
+}
+
+Vec3 ShellBody::momentum() const {
+    return m_shell.linearMomentum() - m_pendingGravity * m_shell.masses().sum();
+}
+
+/// Without the gravity that velocities hold ahead of time, as momentum().
+double ShellBody::kinetic() const {
+    double sum = 0.0;
+    for (int i = 0; i < vertexCount(); ++i) {
+        const Vec3 velocity = m_shell.velocities().col(i) - m_shell.freedom(i) * m_pendingGravity;
+        sum += 0.5 * m_shell.masses()[i] * velocity.squaredNorm();
+    }
+    return sum;
 }
 
 }  // namespace jacket::bullet

@@ -354,7 +354,7 @@ void ShellWorld::accept(Island& island, const StepReport& report, std::span<cons
     m_report.unsettledSteps += report.settled ? 0 : 1;
     m_report.rejectedSteps += report.finite ? 0 : 1;
     for (ShellBody* shell : island.shells) {
-        shell->m_contacts.clear();
+        shell->forgetImpulses();
         shell->m_hasVelocity = report.finite;  // a rejected step: stands still, and is solved afresh
         shell->m_pendingGravity = h * fromBullet(m_impl->gravity);
     }
@@ -368,9 +368,11 @@ void ShellWorld::accept(Island& island, const StepReport& report, std::span<cons
             contact.isVertex() && !standsStill(*obstacle.object))
             m_impl->carried.addTouching(shell, contact.vertices[0], obstacle, endOf(contact.body), contact.normal);
     }
-    for (const Anchor& anchor : island.anchors)
-        m_impl->carried.addTied(*island.shells[anchor.shell], anchor.vertex, island.obstacles[anchor.body],
-                                endOf(anchor.body), anchor.point);
+    for (const Anchor& anchor : island.anchors) {
+        ShellBody& shell = *island.shells[anchor.shell];
+        shell.note(anchor);
+        m_impl->carried.addTied(shell, anchor.vertex, island.obstacles[anchor.body], endOf(anchor.body), anchor.point);
+    }
     for (std::size_t b = 0; b < coupled.size(); ++b) {
         react(*island.obstacles[b].object, coupled[b]);
         btCollisionObject* object = island.obstacles[b].object;

@@ -875,12 +875,13 @@ TEST(AnchorTest, VertexFollowsItsBodyAndPullsIt) {
     Vec3 attached = shell.positions().col(0);
     for (int k = 0; k < 30; ++k) {
         body.freeTwist = body.twist;
-        const std::array<Anchor, 1> anchors{Anchor{.shell = 0, .vertex = 0, .body = 0, .point = attached}};
+        std::array<Anchor, 1> anchors{Anchor{.shell = 0, .vertex = 0, .body = 0, .point = attached}};
         solver.solve({.h = kStep, .gravity = kNoGravity, .shells = shells, .bodies = {&body, 1}, .anchors = anchors});
         attached += kStep * pointVelocity(body.twist, attached - body.position);
         takeUpImpulse(body, kStep);
         shell.advance(kStep);
         EXPECT_LT((shell.positions().col(0) - attached).norm(), 1e-4) << "step " << k;
+        EXPECT_EQ(anchors[0].impulse, Vec3(body.impulse.head<3>()));
     }
     const Vec3 after = shell.linearMomentum() + (body.mass * body.twist).head<3>();
     EXPECT_LT((after - before).norm(), 1e-12 * before.norm());

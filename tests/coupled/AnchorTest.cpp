@@ -123,6 +123,58 @@ TEST(Anchors, EndPinsAndGuides) {
     }
 }
 
+/// A free sheet hangs from two bodies, one of them fixed, and touches a third.
+TEST(Anchors, AreInTheLedger) {
+    Scene scene;
+    auto& post = scene.addBox(btVector3(btScalar(0.05), btScalar(0.05), btScalar(0.05)), 0.0,
+                              btVector3(btScalar(-0.5), btScalar(0.5), btScalar(-0.5)));
+    auto& weight = scene.addSphere(0.05, 0.4, btVector3(btScalar(0.5), btScalar(-0.3), btScalar(0.5)));
+    scene.addBox(btVector3(btScalar(0.1), btScalar(0.1), btScalar(0.1)), 0.3, btVector3(0, btScalar(0.15), 0));
+    auto& sheet = scene.shells->add(squareSheet(1, 6), trampolineCloth());
+    sheet.anchor(0, post);
+    sheet.anchor(1, post);
+    sheet.anchor(48, weight);
+    const double h = 1.0 / 120, mass = sheet.shell().masses().sum();
+    bool touched = false;
+    ShellLedger before = sheet.ledger();
+    for (int i = 0; i < 120; ++i) {
+        const Vec3 falling = 0.4 * toVec3(weight.getLinearVelocity());
+        scene.step(h);
+        touched = touched || !sheet.contacts().empty();
+        const ShellLedger now = sheet.ledger();
+        const Vec3 gained = now.momentum - before.momentum, given = now.exchanged - before.exchanged;
+        ASSERT_LT((gained + given - Vec3(0, -9.81 * mass * h, 0)).norm(), bulletTolerance(1e-9, 1e-7)) << "step " << i;
+        before = now;
+        if (i == 0) continue;  // a new shell is solved twice in its first step
+        const Vec3 change = 0.4 * toVec3(weight.getLinearVelocity()) - falling - Vec3(0, -9.81 * 0.4 * h, 0);
+        ASSERT_LT((change - sheet.anchorImpulse(48)).norm(), bulletTolerance(1e-9, 1e-6)) << "step " << i;
+        Vec3 sum = sheet.anchorImpulse(0) + sheet.anchorImpulse(1) + sheet.anchorImpulse(48);
+        for (const auto& contact : sheet.contacts()) sum -= contact.impulse;
+        ASSERT_LT((sum - given).norm(), 1e-12) << "step " << i;
+    }
+    EXPECT_TRUE(touched);
+    EXPECT_LT(sheet.ledger().exchanged.y(), -1.0);  // what hangs from the post for a second
+    EXPECT_EQ(sheet.anchorImpulse(24), Vec3(Vec3::Zero()));
+    EXPECT_THROW(sheet.anchorImpulse(49), std::out_of_range);
+    sheet.unanchor(0);
+    EXPECT_EQ(sheet.anchorImpulse(0), Vec3(Vec3::Zero()));
+}
+
+/// What hangs at rest pulls with its weight.
+TEST(Anchors, BearWhatHangsFromThem) {
+    Scene scene;
+    ShellMaterial cloth = trampolineCloth();
+    cloth.massDamping = 20.0;
+    auto& sheet = scene.shells->add(squareSheet(1, 6), cloth, {.sleeping = false});
+    for (const int corner : {0, 6, 42, 48}) sheet.pin(corner);
+    auto& ball = scene.addSphere(0.05, 1.0, btVector3(0, btScalar(-0.2), 0));
+    ball.setAngularFactor(btVector3(0, 0, 0));
+    sheet.anchor(kMiddle, ball);
+    scene.run(4.0, kStep);
+    const Vec3 expected(0, 1.0 * 9.81 * kStep, 0);
+    EXPECT_LT((sheet.anchorImpulse(kMiddle) - expected).norm(), 0.01 * expected.norm());
+}
+
 /// A sheet that sleeps on the floor is tied to a box that flies by, and later let go.
 TEST(Anchors, WakeASleepingShell) {
     Scene scene;

@@ -66,6 +66,21 @@ TEST(Testing, EnergyOfAFallIsThatOfItsHeight) {
     EXPECT_LT(end.membrane + end.bending, 1e-9);
 }
 
+/// From the first step on: velocities hold the coming gravity already, the ledger does not.
+TEST(Testing, LedgersAreOfOneInstant) {
+    FallingPair scene;
+    const ShellBody& sheet = (*scene.shells)[0];
+    for (int i = 1; i <= 5; ++i) {
+        scene.step(1.0 / 60);
+        const ShellLedger ledger = sheet.ledger();
+        EXPECT_NEAR(ledger.momentum.y(), -0.3 * 9.81 * i / 60.0, bulletTolerance(1e-9, 1e-6));  // g and h are floats
+        EXPECT_NEAR(ledger.energy.kinetic, 0.5 * ledger.momentum.squaredNorm() / 0.3, 1e-9);
+    }
+    (*scene.shells)[0].setVelocity(btVector3(0, 2, 0));
+    EXPECT_NEAR(sheet.ledger().momentum.y(), 0.3 * 2, 1e-9);
+    EXPECT_NEAR(sheet.ledger().energy.kinetic, 0.5 * 0.3 * 4, 1e-9);
+}
+
 TEST(Testing, EnergyGainSeesAKick) {
     FallingPair scene(0.0);
     scene.bodies[0]->setLinearVelocity(btVector3(1, 0, 0));

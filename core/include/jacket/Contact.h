@@ -70,7 +70,8 @@ struct Contact {
 /// A vertex tied to a point of a body.
 struct Anchor {
     int shell = 0, vertex = 0, body = 0;
-    Vec3 point{0, 0, 0};  ///< where the body has that point at the start of the step [m]
+    Vec3 point{0, 0, 0};    ///< where the body has that point at the start of the step [m]
+    Vec3 impulse{0, 0, 0};  ///< out: what the vertex gave the body there [N s]
 };
 
 /// What a contact did during the step, on the shell; the body got the opposite.

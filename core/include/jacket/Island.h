@@ -16,7 +16,7 @@ struct IslandInput {
     std::span<CoupledBody> bodies{};  ///< `twist` and `impulse` are written
     std::span<const BodyCoupling> couplings{};
     std::span<const RigidContact> rigidContacts{};
-    std::span<const Anchor> anchors{};
+    std::span<Anchor> anchors{};          ///< at most one of a vertex; `impulse` is written
     ContactDetector* contacts = nullptr;  ///< none: no contacts
     bool inOnePiece = false;              ///< some body can move by nothing but one twist in a step
     double restingSpeed = 0.2;            ///< contacts that close no faster do not bounce [m/s]

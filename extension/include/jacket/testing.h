@@ -245,13 +245,9 @@ inline Energy energy(const btDynamicsWorld& world, const bullet::ShellWorld& she
     Energy sum;
     for (int i = 0; i < shells.size(); ++i) {
         const Shell& shell = shells[i].shell();
-        const Vec3 pending = detail::pendingGravity(shells[i]);
-        for (int v = 0; v < shell.vertexCount(); ++v) {
-            const Vec3 velocity = shell.velocities().col(v) - (shell.isPinned(v) ? Vec3::Zero() : pending);
-            sum.kineticOfShells += 0.5 * shell.masses()[v] * velocity.squaredNorm();
-        }
         sum.potentialOfShells -= toVec3(world.getGravity()).dot(shell.positions() * shell.masses());
-        const ShellEnergy stored = shell.energy();
+        const ShellEnergy stored = shells[i].ledger().energy;
+        sum.kineticOfShells += stored.kinetic;
         sum.membrane += stored.membrane;
         sum.bending += stored.bending;
         sum.plasticWork += stored.plasticWork;

@@ -51,12 +51,13 @@ struct BodyContact : ContactImpulse {
     Vec3 barycentric{1, 0, 0};            ///< of the point in that triangle
 };
 
-/// What test writers can hold a shell to: in every step, what it gains is what it was given.
+/// What test writers can hold a shell to: in every step, what it gains is what it was given, by gravity, by what is
+/// noted here, and by forces, pressure, wind, mass damping and pins, which are not.
 struct ShellLedger {
-    ShellEnergy energy;             ///< as it is, and plastic work so far [J]
+    ShellEnergy energy;             ///< as it is when its momentum is `momentum`, and plastic work so far [J]
     double frictionLoss = 0.0;      ///< heat of sliding over bodies so far [J]
     Vec3 momentum = Vec3::Zero();   ///< as it is, see linearMomentum() [N s]
-    Vec3 exchanged = Vec3::Zero();  ///< momentum that contacts have given to bodies so far, to static ones too [N s]
+    Vec3 exchanged = Vec3::Zero();  ///< given to bodies by contacts and anchors so far, to static ones too [N s]
 };
 
 /// One shell of a ShellWorld. Vertices are in the order of the mesh given to ShellWorld::add.
@@ -110,6 +111,8 @@ class ShellBody {
     double contactThickness() const { return m_contactThickness; }
     /// Contacts that carried an impulse in the last substep.
     std::span<const BodyContact> contacts() const { return m_contacts; }
+    /// What an anchored vertex gave its body in the last substep [N s], zero for others; throws std::out_of_range.
+    Vec3 anchorImpulse(int vertex) const;
     /// Linear momentum without the gravity of the coming substep, which Bullet's bodies have not received yet [N s].
     btVector3 linearMomentum() const;
     ShellLedger ledger() const;
@@ -124,8 +127,9 @@ class ShellBody {
     struct Anchor {
         int vertex;
         btCollisionObject* body;
-        btVector3 local;  ///< in the body's frame
-        int bodyId = -1;  ///< the broadphase's; -1: not asked for yet
+        btVector3 local;              ///< in the body's frame
+        int bodyId = -1;              ///< the broadphase's; -1: not asked for yet
+        Vec3 impulse = Vec3::Zero();  ///< on the body, in the last substep [N s]
     };
     Shell m_shell;
     ShellOptions m_options;
@@ -135,7 +139,11 @@ class ShellBody {
     std::vector<BodyContact> m_contacts;
     double m_frictionLoss = 0.0;
     Vec3 m_exchanged = Vec3::Zero();
+    void forgetImpulses();  ///< of the last substep
     void note(const BodyContact& contact);
+    void note(const jacket::Anchor& anchor);
+    Vec3 momentum() const;  ///< see linearMomentum()
+    double kinetic() const;
     std::vector<btVector3> m_positions;
     mutable std::vector<btVector3> m_normals;
     Points m_ahead;  ///< where vertices that touch would be taken along to; empty until one does [m]
@@ -144,6 +152,7 @@ class ShellBody {
     void requireVertex(int vertex, const char* what) const;  ///< throws std::out_of_range
     void endAnchorsOfHeld();                                 ///< of what is pinned or guided
     void fallAsleep();
+    void forgetSolvedVelocity();  ///< the user has set another
     BodyContact describe(const ContactImpulse& impulse, btCollisionObject& object) const;
     std::unique_ptr<ShellRest> m_rest;
     bool m_hasVelocity = false;            ///< a solve has been done for the coming motion
