@@ -233,6 +233,8 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
             m_impl->checks.look(island);
             solveIsland(island, double(h));
         }
+    for (const ShellBody* shell : all) m_report.contacts += static_cast<int>(shell->contacts().size());
+    countStep();
     forgetPushes(*world);
     sleepers.rest(gravity, double(h));
     updateAllBounds(double(h));
@@ -344,15 +346,11 @@ void ShellWorld::solveIsland(Island& island, double h) {
 void ShellWorld::accept(Island& island, const StepReport& report, std::span<const CoupledBody> coupled, double h) {
     m_report.pcgIterations += report.pcgIterations;
     m_report.solves += report.solves;
-    m_report.passedSteps += report.passed || report.mayPass ? 1 : 0;
+    m_report.passed = m_report.passed || report.passed || report.mayPass;
     m_report.limited = m_report.limited || report.limited;
-    m_report.contacts += static_cast<int>(report.contacts.size());
     m_report.converged = m_report.converged && report.converged;
     m_report.settled = m_report.settled && report.settled;
     m_report.finite = m_report.finite && report.finite;
-    m_report.unconvergedSteps += report.converged ? 0 : 1;
-    m_report.unsettledSteps += report.settled ? 0 : 1;
-    m_report.rejectedSteps += report.finite ? 0 : 1;
     for (ShellBody* shell : island.shells) {
         shell->forgetImpulses();
         shell->m_hasVelocity = report.finite;  // a rejected step: stands still, and is solved afresh
@@ -382,6 +380,13 @@ void ShellWorld::accept(Island& island, const StepReport& report, std::span<cons
             m_impl->alterations.push_back({btRigidBody::upcast(object), idOf(m_world, object),
                                            ledByBullet(island.obstacles[b], coupled[b].twist, h), endOf(int(b))});
     }
+}
+
+void ShellWorld::countStep() {
+    m_report.passedSteps += m_report.passed ? 1 : 0;
+    m_report.unconvergedSteps += m_report.converged ? 0 : 1;
+    m_report.unsettledSteps += m_report.settled ? 0 : 1;
+    m_report.rejectedSteps += m_report.finite ? 0 : 1;
 }
 
 void ShellWorld::react(btCollisionObject& object, const CoupledBody& coupled) {

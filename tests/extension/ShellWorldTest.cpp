@@ -189,6 +189,39 @@ TEST(ShellWorld, ZeroStepIsNoStep) {
     EXPECT_EQ(sheet.positions()[3].y(), 0);
 }
 
+/// Three sheets, each an island of its own and a newcomer in the first step, with an iteration where they want more.
+TEST(ShellWorld, AStepCountsOnceHoweverManyShellsFailInIt) {
+    BulletScene scene;
+    for (int k = 0; k < 3; ++k) {
+        TriangleMesh mesh = squareSheet(1, 10);
+        mesh.positions.row(0).array() += 5.0 * k;
+        auto& sheet = scene.shells->add(mesh, trampolineCloth(), {.maxIterations = 1});
+        sheet.pin(0);
+        sheet.pin(10);
+    }
+    int unconverged = 0;
+    for (int i = 0; i < 30; ++i) {
+        scene.step(1.0 / 60);
+        unconverged += scene.shells->lastStep().converged ? 0 : 1;
+        ASSERT_EQ(scene.shells->lastStep().unconvergedSteps, unconverged) << "step " << i;
+    }
+    EXPECT_GT(unconverged, 0);
+}
+
+/// What is solved again in the first step touches once.
+TEST(ShellWorld, ContactsOfAReportAreThoseOfTheShells) {
+    BulletScene scene;
+    scene.addFloor();
+    TriangleMesh mesh = squareSheet(1, 4);
+    mesh.positions.row(1).array() += 1e-4;
+    auto& sheet = scene.shells->add(mesh, trampolineCloth());
+    for (int i = 0; i < 5; ++i) {
+        scene.step(1.0 / 60);
+        EXPECT_EQ(scene.shells->lastStep().contacts, int(sheet.contacts().size())) << "step " << i;
+    }
+    EXPECT_FALSE(sheet.contacts().empty());
+}
+
 TEST(ShellWorld, WarnsOnceOfAShapeItCannotTouch) {
     BulletScene scene;
     // Neither convex nor a list of triangles.

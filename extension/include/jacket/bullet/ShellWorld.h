@@ -15,16 +15,18 @@ namespace jacket::bullet {
 
 struct Island;
 
-/// What the last substep cost and did, over all shells.
+/// What the last substep cost and did, over all shells. A substep counts once for each of its sums since the world was
+/// made, however many shells there are and although those just added are solved for twice.
 struct WorldReport {
     int shells = 0, awake = 0, contacts = 0, pcgIterations = 0, solves = 0;
     bool converged = true;
     bool settled = true;          ///< false: contacts of a shell have used up their rounds
     bool finite = true;           ///< false: a shell's step was rejected; it stood still
-    int rejectedSteps = 0;        ///< since the world was made
+    bool passed = false;          ///< a fast body went through a shell, or may have
+    int rejectedSteps = 0;        ///< since the world was made: those that were not `finite`
     int unconvergedSteps = 0;     ///< since the world was made
     int unsettledSteps = 0;       ///< since the world was made
-    int passedSteps = 0;          ///< since the world was made: in which a fast body went through a shell, or may have
+    int passedSteps = 0;          ///< since the world was made
     bool limited = false;         ///< deformation was cut short, or a step would have gained energy
     StepTimes times{};            ///< of the solves, over all islands [s]
     double secondsContact = 0.0;  ///< of the narrow phase, which times.contact includes
@@ -90,6 +92,7 @@ class ShellWorld : public btActionInterface {
     void forgetPushes(const btCollisionWorld& world);
     void updateAllBounds(double h);
     void updateBounds(ShellBody& shell, double fastest, double h);
+    void countStep();
     btDynamicsWorld& m_world;
     std::vector<std::unique_ptr<ShellBody>> m_shells;
     WorldReport m_report;
