@@ -151,17 +151,19 @@ void Shell::requireVertex(int vertex, const char* what) const {
 }
 
 void Shell::pin(int vertex) {
-    ++m_revision;
     requireVertex(vertex, "Shell::pin");
+    if (m_pinned[vertex] && m_pinTarget.at(vertex) == m_x.col(vertex)) return;
+    ++m_revision;
     m_pinCount += m_pinned[vertex] || isGuided(vertex) ? 0 : 1;
     m_pinned[vertex] = 1;
     m_pinTarget[vertex] = m_x.col(vertex);
 }
 
 void Shell::movePin(int vertex, const Vec3& target) {
-    ++m_revision;
     requireVertex(vertex, "Shell::movePin");
     requireFinite(target, "Shell::movePin: target");
+    if (m_pinned[vertex] && m_pinTarget.at(vertex) == target) return;
+    ++m_revision;
     pin(vertex);
     m_pinTarget[vertex] = target;
 }
@@ -179,15 +181,17 @@ void Shell::unpin(int vertex) {
 }
 
 void Shell::setForce(int vertex, const Vec3& force) {
-    ++m_revision;
     requireVertex(vertex, "Shell::setForce");
     requireFinite(force, "Shell::setForce: force");
+    if (m_force.col(vertex) == force) return;
+    ++m_revision;
     m_force.col(vertex) = force;
 }
 
 void Shell::setPressure(double pressure) {
-    ++m_revision;
     if (!std::isfinite(pressure)) throw std::invalid_argument("Shell::setPressure: pressure [Pa] must be finite");
+    if (pressure == m_pressure) return;
+    ++m_revision;
     m_pressure = pressure;
 }
 

@@ -173,6 +173,7 @@ ShellBody* ShellWorld::find(const btCollisionObject& object) {
 
 void ShellWorld::setWind(const Wind& wind) {
     validate(wind);
+    if (m_impl->hasWind && m_impl->wind == wind) return;
     m_impl->wind = wind;
     m_impl->hasWind = m_impl->windChanged = true;
 }

@@ -149,6 +149,30 @@ INSTANTIATE_TEST_SUITE_P(
                             }}),
     [](const auto& alarm) { return std::string(alarm.param.name); });
 
+/// A user who sets everything anew in each frame, to what it is.
+TEST(Sleeping, WhatIsSetToWhatItIsWakesNoShell) {
+    Scene scene;
+    scene.addFloor();
+    auto& sheet = scene.shells->add(sheetAt(0.6, 8, 2e-4), trampolineCloth());
+    const btVector3 corner = sheet.positions()[80];
+    const Wind breeze{.velocity = {0, 0, 0.1}};
+    int slept = 0;
+    for (int i = 0; i < 300; ++i) {
+        scene.shells->setWind(breeze);
+        sheet.pin(0);
+        sheet.movePin(80, corner);
+        sheet.shell().setForce(5, Vec3(0, -1e-3, 0));
+        sheet.shell().setPressure(0.01);
+        scene.step(kStep);
+        slept += sheet.isAsleep() ? 1 : 0;
+    }
+    EXPECT_GT(slept, 60);
+    ASSERT_TRUE(sheet.isAsleep());
+    scene.shells->setWind({.velocity = {0, 0, 0.2}});
+    scene.step(kStep);
+    EXPECT_FALSE(sheet.isAsleep());
+}
+
 TEST(Sleeping, AMovedPinWakesAHangingSheet) {
     Scene scene;
     ShellMaterial damped = trampolineCloth();

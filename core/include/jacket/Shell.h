@@ -46,6 +46,7 @@ struct Wind {
     double airDensity = 1.2;       ///< [kg/m^3]
     double normalDrag = 1.0;       ///< C_n [-]
     double tangentialDrag = 0.02;  ///< C_t [-]
+    bool operator==(const Wind&) const = default;
 };
 
 /// Throws std::invalid_argument naming the field, unless the velocity is finite and the rest finite and >= 0.
@@ -148,7 +149,8 @@ class Shell {
     void setPressure(double pressure);
     double pressure() const { return m_pressure; }
 
-    /// Changes whenever the caller changed the shell: state, supports, loads or rest shape; not as it moves by itself.
+    /// Changes whenever the caller changed the shell: state, supports, loads or rest shape; not as it moves by itself,
+    /// nor by a pin, force or pressure that is set to what it is.
     unsigned revision() const { return m_revision; }
 
     ShellEnergy energy() const;

@@ -65,7 +65,8 @@ class ShellWorld : public btActionInterface {
     ShellBody& operator[](int i) { return *m_shells[i]; }
     const ShellBody& operator[](int i) const { return *m_shells[i]; }
 
-    void setWind(const Wind& wind);  ///< throws std::invalid_argument, see validate(const Wind&)
+    /// Wakes all shells unless it blows already. Throws std::invalid_argument, see validate(const Wind&).
+    void setWind(const Wind& wind);
     void clearWind();
     /// How many threads share the solve of a large shell (1000 vertices or more, and no free body touches it), the one
     /// that steps the world included. Any number gives the same bits; more than there are processors gain nothing. 1,
