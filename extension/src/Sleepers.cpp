@@ -64,9 +64,13 @@ Sleepers::Sleepers(btCollisionWorld& world, Obstacles& obstacles, std::span<cons
 bool Sleepers::contains(const ShellRest::Support& support) const {
     const auto& objects = m_world.getCollisionObjectArray();
     const int count = objects.size();
-    if (support.place < count && objects[support.place] == support.object) return true;
+    const auto isHere = [&] {
+        const btCollisionObject* object = objects[support.place];
+        return object == support.object && object->getBroadphaseHandle()->getUid() == support.id;
+    };
+    if (support.place < count && isHere()) return true;
     for (support.place = 0; support.place < count; ++support.place)  // others have left
-        if (objects[support.place] == support.object) return true;
+        if (isHere()) return true;
     return false;
 }
 
@@ -164,7 +168,8 @@ void Sleepers::rest(const Vec3& gravity, double h) {
         rest.gravity = gravity;
         for (btCollisionObject* object : c.supports) {
             jacket::bullet::fallAsleep(*object);
-            rest.supports.push_back({object, object->getWorldTransform(), object->getWorldArrayIndex()});
+            rest.supports.push_back({object, object->getBroadphaseHandle()->getUid(), object->getWorldTransform(),
+                                     object->getWorldArrayIndex()});
         }
     }
 }

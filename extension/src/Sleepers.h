@@ -22,6 +22,7 @@ struct ShellRest {
     double boundsSpeed = 0.0;     ///< of other objects, that its bounds in the broadphase allow for [m/s]
     struct Support {
         btCollisionObject* object;
+        int id;  ///< the broadphase's: one that was removed and added again has another
         btTransform pose;
         mutable int place;  ///< in the world's list, where it was last found
     };

@@ -149,6 +149,19 @@ INSTANTIATE_TEST_SUITE_P(
                             }}),
     [](const auto& alarm) { return std::string(alarm.param.name); });
 
+/// It is where it was, and touches nothing any more.
+TEST(Sleeping, AFloorThatIsAddedAgainWithAnotherMaskHoldsNoSheet) {
+    Scene scene;
+    auto& floor = scene.addFloor();
+    auto& sheet = scene.shells->add(sheetAt(0.6, 8, 2e-4), trampolineCloth());
+    ASSERT_GT(timeToSleep(scene, sheet, 4.0), 0.0);
+    scene.world.removeRigidBody(&floor);
+    scene.world.addRigidBody(&floor, btBroadphaseProxy::StaticFilter, 0);
+    scene.run(0.5, kStep);
+    EXPECT_FALSE(sheet.isAsleep());
+    EXPECT_LT(sheet.positions()[0].y(), -0.1);
+}
+
 /// A user who sets everything anew in each frame, to what it is.
 TEST(Sleeping, WhatIsSetToWhatItIsWakesNoShell) {
     Scene scene;
