@@ -147,9 +147,9 @@ bool ContactResponse::isNearOthers(int vertex, int body) const {
     });
 }
 
-/// Whether a face's contact is nearly at a vertex that is held off the body there, or is being taken out of it, the same
-/// way. Beside a corner or an edge of the body, or beside a small ball, it is not: its triangle would go on into the
-/// body, and the more so where something else holds the vertex. Between the edges of two bodies, neither of which
+/// Whether a face's contact is nearly at a vertex that is held off the body there, or is being taken out of it, the
+/// same way. Beside a corner or an edge of the body, or beside a small ball, it is not: its triangle would go on into
+/// the body, and the more so where something else holds the vertex. Between the edges of two bodies, neither of which
 /// touches the vertex, each would push the triangle into the other: that is left to the vertex.
 bool ContactResponse::isSaidByVertex(const Contact& contact) const {
     int corner = 0;
