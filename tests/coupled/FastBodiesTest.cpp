@@ -146,18 +146,23 @@ TEST_P(SmallBoard, HoldsASheetThatHangsOverIt) {
 INSTANTIATE_TEST_SUITE_P(Speeds, SmallBoard, ::testing::Values(4.6, 7.0, 10.0));
 
 /// Where the board's corners and edges end beside a vertex that hangs past them, its triangles would cut across. At
-/// rest the contacts of a step follow from those of the last one.
+/// rest the contacts of a step follow from those of the last one. How it folds, and with it the solves, rounding
+/// decides: they are counted over starts a micrometre apart.
 TEST(SmallBoardAtRest, IsNotCutInto) {
+    constexpr int kStarts = 3;
     for (const int cells : {20, 30}) {
-        Shelf scene(0.015, {0.03, 0.7, -0.02}, 0.0, cells);
-        scene.run(2.0, kStep);
         int solves = 0;
-        for (int i = 0; i < 60; ++i) {
-            scene.step(kStep);
-            EXPECT_LT(penetration(scene.sheet, scene.board), 1e-4) << cells << " cells, step " << i;
-            solves += scene.shells->lastStep().solves;
+        for (int start = 0; start < kStarts; ++start) {
+            Shelf scene(0.015, {0.03 + 1e-6 * start, 0.7, -0.02}, 0.0, cells);
+            scene.run(2.0, kStep);
+            for (int i = 0; i < 60; ++i) {
+                scene.step(kStep);
+                EXPECT_LT(penetration(scene.sheet, scene.board), 1e-4)
+                    << cells << " cells, start " << start << ", step " << i;
+                solves += scene.shells->lastStep().solves;
+            }
         }
-        EXPECT_LT(solves, 200) << cells << " cells";
+        EXPECT_LT(solves, 150 * kStarts) << cells << " cells";
     }
 }
 

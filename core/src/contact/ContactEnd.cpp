@@ -139,6 +139,14 @@ int ContactResponse::touchOf(const Contact& contact) const {
     return -1;
 }
 
+/// The touch of a corner of a face's contact with the same body, -1: none.
+int ContactResponse::touchAtVertex(const Contact& contact, int corner) const {
+    Contact vertex = contact;
+    vertex.feature = Feature::vertex(contact.vertices[corner]);
+    const auto known = m_index.find(keyOf(vertex));
+    return known == m_index.end() ? -1 : known->second;
+}
+
 /// Whether a vertex is near some other body that does not touch it.
 bool ContactResponse::isNearOthers(int vertex, int body) const {
     return std::any_of(m_touches.begin(), m_touches.end(), [&](const Touch& touch) {
@@ -157,11 +165,8 @@ bool ContactResponse::isSaidByVertex(const Contact& contact) const {
     const int vertex = globalVertex(contact, corner);
     if (isNearOthers(vertex, contact.body)) return true;
     const auto isAlong = [&](const Vec3& n) { return n.dot(contact.normal) > kTheSame * n.norm(); };
-    Contact there = contact;
-    there.feature = Feature::vertex(contact.vertices[corner]);
-    const auto known = m_index.find(keyOf(there));
-    if (known != m_index.end() && m_touches[known->second].active && isAlong(m_touches[known->second].contact.normal))
-        return true;
+    const int there = touchAtVertex(contact, corner);
+    if (there >= 0 && m_touches[there].active && isAlong(m_touches[there].contact.normal)) return true;
     const auto raised = m_raised.find(vertex);
     return raised != m_raised.end() && isAlong(raised->second);
 }
@@ -258,11 +263,9 @@ bool ContactResponse::liftVertices(const Contact& contact, double by, const Isla
     if (by < m_vertexSlop) return true;
     for (int a = 0; a < 3; ++a) {
         if (contact.weights[a] == 0.0) continue;
-        Contact vertex = contact;
-        vertex.feature = Feature::vertex(contact.vertices[a]);
-        const auto known = m_index.find(keyOf(vertex));
-        if (known == m_index.end()) continue;
-        Touch& touch = m_touches[known->second];
+        const int there = touchAtVertex(contact, a);
+        if (there < 0) continue;
+        Touch& touch = m_touches[there];
         if (touch.contact.normal.dot(contact.normal) < kSameWay || touch.pressed) continue;
         if (!touch.active && !isQuick()) continue;
         const double off = touch.active ? touch.offset : endGap(touch, solved);

@@ -227,6 +227,7 @@ class ContactResponse {
     bool isHeld(const Contact& contact) const;
     bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
     int touchOf(const Contact& contact) const;
+    int touchAtVertex(const Contact& contact, int corner) const;
     bool isNearOthers(int vertex, int body) const;
     bool isSaidByVertex(const Contact& contact) const;
     bool closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round);
