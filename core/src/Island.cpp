@@ -162,7 +162,8 @@ struct IslandSolver::Impl {
     double gainOfCoasting(const IslandInput& input);
     void blend(const IslandInput& input, const Points& other);
     void coast(const IslandInput& input, const Points& coasting);
-    double shareWithin(const IslandInput& input, const CoupledBody& body, int dynamic, double speed) const;
+    double shareWithin(const IslandInput& input, const CoupledBody& body, int dynamic, const Vec6& after,
+                       double speed) const;
     void limitBodies(const IslandInput& input, StepReport& report);
     void makeRigid(const IslandInput& input, Points& velocities, double time) const;
     const BodyVectors& endTwists() const;
@@ -612,14 +613,14 @@ const BodyVectors& IslandSolver::Impl::endTwists() const {
     return twistsAtEnd = freeTwist + impulseShare * ((u.w - freeTwist).array().rowwise() * share.array()).matrix();
 }
 
-/// The largest share of its solved change of twist with which a body keeps within its energy without the shells and
+/// The largest share of its change of twist to `after` with which a body keeps within its energy without the shells and
 /// that of its mass at `speed`. Where it is held in some directions, that mass says nothing of the others: there its
 /// speed is asked for too, besides what gravity may do to it.
 double IslandSolver::Impl::shareWithin(const IslandInput& input, const CoupledBody& body, int dynamic,
-                                       double speed) const {
+                                       const Vec6& after, double speed) const {
     constexpr int kMostHalvings = 40;
-    const Vec6 before = freeTwist.col(dynamic), change = impulseShare * (u.w.col(dynamic) - before);
-    const auto energy = [&](const Vec6& twist) { return 0.5 * twist.dot(body.mass * twist); };
+    const Vec6 before = freeTwist.col(dynamic), change = impulseShare * (after - before);
+    const auto energy = [&](const Vec6& twist) { return 0.5 * twist.dot(supports.ownMass(dynamic) * twist); };
     const double mass = body.mass.topLeftCorner<3, 3>().trace() / 3.0;
     const double most = std::max(energy(body.freeTwist), energy(before)) + 0.5 * mass * speed * speed;
     double most2 = std::numeric_limits<double>::infinity();
@@ -628,26 +629,30 @@ double IslandSolver::Impl::shareWithin(const IslandInput& input, const CoupledBo
                 (input.h * input.gravity).squaredNorm();
     double share = 1.0;
     for (int i = 0; i < kMostHalvings; ++i, share *= 0.5) {
-        const Vec6 after = before + share * change;
-        if (energy(after) <= most && after.head<3>().squaredNorm() <= most2) return share;
+        const Vec6 twist = before + share * change;
+        if (energy(twist) <= most && twist.head<3>().squaredNorm() <= most2) return share;
     }
     return 0.0;
 }
 
 /// What a shell pushes cannot become much faster than the shell: a body that does, as light ones may where contacts did
 /// not settle, takes a share of their impulses only, and what they remember is forgotten. Where they did not settle,
-/// the shell's velocities at the start are what is known of it.
+/// the shell's velocities at the start are what is known of it, and what bears a body may have been solved as pulling
+/// it back from where the shell then throws it.
 void IslandSolver::Impl::limitBodies(const IslandInput& input, StepReport& report) {
     const bool isSure = !unsettled && !report.limited;
     const std::vector<double>& speeds = response.speedsBeside(start, isSure ? v : start);
+    twistChange = u.w - freeTwist;
+    system.momentum(twistChange, momentum);
+    const BodyVectors& after = isSure ? u.w : supports.respond(momentum, input.h * input.gravity.norm());
     double least = 1.0;
     for (std::size_t b = 0; b < dynamicBodies.size(); ++b) {
-        const int body = dynamicBodies[b];
+        const int body = dynamicBodies[b], dynamic = static_cast<int>(b);
         const bool isAnchored = std::any_of(input.anchors.begin(), input.anchors.end(),
                                             [&](const auto& anchor) { return anchor.body == body; });
         if (isAnchored || !(speeds[body] >= 0.0)) continue;
         const double speed = (isSure ? kMostOvertaking : 1.0) * speeds[body];
-        bodyShare[b] = shareWithin(input, input.bodies[body], static_cast<int>(b), speed);
+        bodyShare[b] = shareWithin(input, input.bodies[body], dynamic, after.col(dynamic), speed);
         least = std::min(least, bodyShare[b]);
         if (bodyShare[b] < 1.0) response.forget(body);
     }

@@ -75,6 +75,28 @@ TEST(BodySupports, TheGroundLetsGoOfABodyThatAnotherOneTouches) {
     EXPECT_NEAR(supports.masses()[0](1, 1), 1.0 + 1e4 / 3, 1e-6);
 }
 
+/// A beam on two feet that is lifted at one end turns about the other: no foot holds it down, and it is as light as it
+/// is.
+TEST(BodySupports, WhatALiftedBodyRestedOnDoesNotHoldItBack) {
+    std::vector<CoupledBody> bodies{falling(1)};
+    const auto foot = [](double x) { return (Vec6() << 0, 1, 0, 0, 0, x).finished(); };
+    const BodySupport feet[] = {{foot(-1), 0.0, 1e4}, {foot(1), 0.0, 1e4}};
+    bodies[0].supports = feet;
+    Vec6 momentum = bodies[0].mass * bodies[0].freeTwist;
+    for (const BodySupport& each : feet) bodies[0].mass += each.weight * each.row * each.row.transpose();
+    bodies[0].freeTwist = bodies[0].mass.ldlt().solve(momentum);
+    BodySupports supports;
+    supports.begin(bodies, {}, {}, {0});
+    EXPECT_TRUE(supports.ownMass(0).isApprox(Mat6(Mat6::Identity()), 1e-9));
+    const Vec6 lift = 3.0 * foot(1);  // at an end: held by both feet the beam would stay
+    const Vec6 twist = supports.respond(lift, 1.0);
+    EXPECT_NEAR(twist.dot(foot(-1)), 0.0, 1e-3);
+    // About the other foot: inertia 1 + 1, and an angular momentum of 2 * 3 less the weight's 1 * 1.
+    EXPECT_NEAR(twist[5], (6.0 - 1.0) / 2.0, 1e-3);
+    supports.begin(bodies, {}, {}, {0});
+    EXPECT_LT(supports.respond(-lift, 1.0).norm(), 1e-3);  // pressed, it stays
+}
+
 TEST(BodySupports, AContactWithABodyOfPrescribedMotionDoesNothing) {
     const std::vector<CoupledBody> bodies{falling(1), falling(1)};
     BodySupports supports;

@@ -11,6 +11,11 @@ constexpr double kPull = 1e-2;   // of a body's weight, or of what is pressed on
                                  // that pulls less may stay for the step
 constexpr int kMostReturns = 1;  // a contact that has let go twice stays away: it closes in the bodies' own step
 
+/// Along the axis where that is least [kg].
+double lightest(const Mat6& mass) {
+    return mass.diagonal().head<3>().minCoeff();
+}
+
 }  // namespace
 
 void BodySupports::begin(std::span<const CoupledBody> bodies, std::span<const BodyCoupling> couplings,
@@ -20,15 +25,15 @@ void BodySupports::begin(std::span<const CoupledBody> bodies, std::span<const Bo
     m_mass.clear();
     m_momentum.clear();
     m_freeTwist.clear();
-    m_lightest.clear();
+    m_ownMass.clear();
     m_couplings.clear();
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         if (dynamicIndex[b] < 0) continue;
         for (const BodySupport& contact : bodies[b].supports)
             m_supports.push_back({.body = dynamicIndex[b], .contact = contact});
-        Vec3 own = bodies[b].mass.diagonal().head<3>();  // without what bears it
-        for (const BodySupport& contact : bodies[b].supports) own -= contact.weight * contact.row.head<3>().cwiseAbs2();
-        m_lightest.push_back(own.minCoeff());
+        m_ownMass.push_back(bodies[b].mass);
+        for (const BodySupport& contact : bodies[b].supports)
+            m_ownMass.back() -= contact.weight * contact.row * contact.row.transpose();
         m_mass.push_back(bodies[b].mass);
         m_momentum.push_back(bodies[b].mass * bodies[b].freeTwist);
         m_freeTwist.push_back(bodies[b].freeTwist);
@@ -60,9 +65,17 @@ void BodySupports::add(const Pair& pair, double sign) {
         sign * weight * rowA * rowB.transpose();
 }
 
-/// Of bodies that couplings join: those of their common mass matrix. Only where there are pairs; free twists that were
-/// given agree with the given couplings.
+/// Of bodies that couplings join. Only where there are pairs; free twists that were given agree with the given
+/// couplings.
 void BodySupports::solveFreeTwists() {
+    m_rhs = m_momentum;
+    solveTwists(m_rhs);
+    for (std::size_t b = 0; b < m_mass.size(); ++b)
+        if (m_place[b] >= 0) m_freeTwist[b] = m_rhs[b];
+}
+
+/// In place: of bodies that couplings join by their common mass matrix, of the others by their own.
+void BodySupports::solveTwists(std::vector<Vec6>& momenta) {
     std::vector<int>& place = m_place;
     place.assign(m_mass.size(), -1);
     int size = 0;
@@ -78,7 +91,7 @@ void BodySupports::solveFreeTwists() {
     for (std::size_t b = 0; b < m_mass.size(); ++b) {
         if (place[b] < 0) continue;
         matrix.block<6, 6>(place[b], place[b]) = m_mass[b];
-        momentum.segment<6>(place[b]) = m_momentum[b];
+        momentum.segment<6>(place[b]) = momenta[b];
     }
     for (const BodyCoupling& c : m_couplings) {
         matrix.block<6, 6>(place[c.a], place[c.b]) += c.mass;
@@ -87,7 +100,7 @@ void BodySupports::solveFreeTwists() {
     factor.compute(matrix);
     factor.solveInPlace(momentum);
     for (std::size_t b = 0; b < m_mass.size(); ++b)
-        if (place[b] >= 0) m_freeTwist[b] = momentum.segment<6>(place[b]);
+        momenta[b] = place[b] >= 0 ? Vec6(momentum.segment<6>(place[b])) : Vec6(m_mass[b].ldlt().solve(momenta[b]));
 }
 
 bool BodySupports::Hold::turn(double opening, double most) {
@@ -121,7 +134,7 @@ bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, dou
     for (Support& support : m_supports) {
         const auto& [row, velocity, weight] = support.contact;
         const double opening = row.dot(w.col(support.body)) - velocity;
-        const double pull = kPull * std::max(m_lightest[support.body] * kick, load[support.body]);
+        const double pull = kPull * std::max(lightest(m_ownMass[support.body]) * kick, load[support.body]);
         if (!support.hold.turn(opening, pull / weight)) continue;
         const double sign = support.hold.holds ? 1.0 : -1.0;
         m_mass[support.body] += sign * weight * row * row.transpose();
@@ -132,13 +145,28 @@ bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, dou
     for (Pair& pair : m_pairs) {
         const auto& [a, b, rowA, rowB, weight] = pair.contact;
         const double opening = rowA.dot(w.col(a)) + rowB.dot(w.col(b));
-        const double pull = kPull * std::max(std::min(m_lightest[a], m_lightest[b]) * kick, std::min(load[a], load[b]));
+        const double pull = kPull * std::max(std::min(lightest(m_ownMass[a]), lightest(m_ownMass[b])) * kick,
+                                             std::min(load[a], load[b]));
         if (!pair.hold.turn(opening, pull / weight)) continue;
         add(pair, pair.hold.holds ? 1.0 : -1.0);
         changed = true;
     }
     if (changed && !m_pairs.empty()) solveFreeTwists();
     return changed;
+}
+
+const Eigen::Matrix<double, 6, Eigen::Dynamic>& BodySupports::respond(
+    const Eigen::Matrix<double, 6, Eigen::Dynamic>& impulses, double kick) {
+    constexpr int kMostRounds = 8;
+    m_response.resize(6, impulses.cols());
+    for (int round = 0; round < kMostRounds; ++round) {
+        m_rhs = m_momentum;
+        for (std::size_t b = 0; b < m_rhs.size(); ++b) m_rhs[b] += impulses.col(static_cast<Eigen::Index>(b));
+        solveTwists(m_rhs);
+        for (std::size_t b = 0; b < m_rhs.size(); ++b) m_response.col(static_cast<Eigen::Index>(b)) = m_rhs[b];
+        if (!update(m_response, kick)) break;
+    }
+    return m_response;
 }
 
 }  // namespace jacket

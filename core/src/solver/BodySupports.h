@@ -18,7 +18,11 @@ class BodySupports {
     /// Lets go of contacts that pull and takes hold of those that close, at the solved twists; true if any changed.
     /// `kick`: what gravity does in the step [m/s].
     bool update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, double kick);
+    /// Twists that impulses of shells lead to where contacts push only. The contacts are then as that leaves them.
+    const Eigen::Matrix<double, 6, Eigen::Dynamic>& respond(const Eigen::Matrix<double, 6, Eigen::Dynamic>& impulses,
+                                                            double kick);
     const std::vector<Mat6>& masses() const { return m_mass; }
+    const Mat6& ownMass(int body) const { return m_ownMass[body]; }  ///< without what bears it
     const std::vector<Vec6>& freeTwists() const { return m_freeTwist; }
     const std::vector<BodyCoupling>& couplings() const { return m_couplings; }
 
@@ -42,6 +46,7 @@ class BodySupports {
     void add(const Pair& pair, double sign);
     void findLoads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w);
     void solveFreeTwists();
+    void solveTwists(std::vector<Vec6>& momenta);
 
     std::vector<Support> m_supports;
     std::vector<Pair> m_pairs;
@@ -49,9 +54,11 @@ class BodySupports {
     std::vector<Vec6> m_momentum, m_freeTwist;
     std::vector<BodyCoupling> m_couplings;  ///< those that were given, then one for each pair
     std::size_t m_givenCouplings = 0;
-    std::vector<double> m_lightest;  ///< of each body its own mass, along the axis where that is least [kg]
-    std::vector<double> m_loads;     ///< see findLoads [N s]
-    std::vector<int> m_place;        ///< of each body in the common mass matrix, -1: it stands alone
+    std::vector<Mat6> m_ownMass;  ///< see ownMass
+    std::vector<Vec6> m_rhs;      ///< momenta, and then twists
+    Eigen::Matrix<double, 6, Eigen::Dynamic> m_response;
+    std::vector<double> m_loads;  ///< see findLoads [N s]
+    std::vector<int> m_place;     ///< of each body in the common mass matrix, -1: it stands alone
     struct CommonMass {
         Eigen::MatrixXd matrix;
         Eigen::VectorXd momentum;
