@@ -138,7 +138,8 @@ std::pmr::vector<RigidContact> RigidContacts::between(std::span<const Obstacle> 
             const auto other = indexOf.find(manifold->getBody1());
             if (manifold->getBody0() != obstacles[b].object || other == indexOf.end()) continue;
             const CoupledBody &first = obstacles[b].body, &second = obstacles[other->second].body;
-            const double weight = kSupport * std::max(linearMassOf(*btRigidBody::upcast(manifold->getBody0())),
+            // Of the lighter one: a multiple of the heavier one's could be so large that rounding throws the lighter.
+            const double weight = kSupport * std::min(linearMassOf(*btRigidBody::upcast(manifold->getBody0())),
                                                       linearMassOf(*btRigidBody::upcast(manifold->getBody1())));
             for (int k = 0; k < manifold->getNumContacts(); ++k) {
                 const btManifoldPoint& point = manifold->getContactPoint(k);

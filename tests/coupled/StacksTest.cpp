@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "support/HardScenes.h"
+#include "support/RandomWorld.h"
 
 namespace jacket::bullet::testing {
 namespace {
@@ -93,6 +94,56 @@ TEST_P(StackOnCloth, StandsAndSleeps) {
 }
 INSTANTIATE_TEST_SUITE_P(Grid, StackOnCloth,
                          ::testing::Combine(::testing::Values(1, 2, 3), ::testing::Values(1.0 / 60, 1.0 / 240)));
+
+/// A light box set down on sheet metal on a heavy one: in steps as long as these contacts between the three do not
+/// always settle, and what bears the light one is then no reason to take what the sheet pushes it by for harmless.
+/// Meshes whose vertices are moved about by chance, masses of both boxes.
+class LightBoxOnMetal : public ::testing::TestWithParam<std::tuple<double, double>> {
+  protected:
+    /// Of where it goes, which is what counts: velocities hold what the boxes bear, too [m/s].
+    static double fastest(double light, double heavy, unsigned seed) {
+        constexpr double kStep = 1.0 / 60;
+        Scene<> scene;
+        scene.addFloor();
+        scene.addBox(btVector3(btScalar(0.25), btScalar(0.1), btScalar(0.25)), heavy, btVector3(0, btScalar(0.1), 0))
+            .setActivationState(DISABLE_DEACTIVATION);
+        const ShellMaterial steel = materials::steel(1e-3);
+        scene.shells->add(sheet(0.2 + 0.5 * steel.thickness + 1e-6, seed), steel, {.sleeping = false});
+        btRigidBody& box = scene.addBox(btVector3(btScalar(0.1), btScalar(0.1), btScalar(0.1)), light,
+                                        btVector3(btScalar(0.03), btScalar(0.3 + steel.thickness), btScalar(0.02)));
+        box.setActivationState(DISABLE_DEACTIVATION);
+        double most = 0.0;
+        btVector3 last = box.getWorldTransform().getOrigin();
+        for (int i = 0; i < 60; ++i) {
+            scene.step(kStep);
+            const btVector3 now = box.getWorldTransform().getOrigin();
+            most = std::max(most, double((now - last).length()) / kStep);
+            last = now;
+        }
+        return most;
+    }
+    static TriangleMesh sheet(double height, unsigned seed) {
+        constexpr double kSide = 0.4;
+        constexpr int kCells = 7;
+        TriangleMesh mesh = squareSheet(kSide, kCells);
+        Draw draw(seed);
+        const double most = 0.3 * kSide / kCells;
+        for (int i = 0; i < mesh.positions.cols(); ++i)
+            for (const int axis : {0, 2})
+                if (std::abs(mesh.positions(axis, i)) < 0.49 * kSide)
+                    mesh.positions(axis, i) += draw.between(-most, most);
+        mesh.positions.row(1).array() += height;
+        return mesh;
+    }
+};
+
+TEST_P(LightBoxOnMetal, IsNotThrown) {
+    const auto [light, heavy] = GetParam();
+    for (const unsigned seed : {1u, 2u, 3u, 4u}) EXPECT_LT(fastest(light, heavy, seed), 3.0) << "mesh " << seed;
+}
+INSTANTIATE_TEST_SUITE_P(Masses, LightBoxOnMetal,
+                         ::testing::Values(std::tuple{1e-3, 100.0}, std::tuple{0.0126, 126.0}, std::tuple{0.1, 100.0},
+                                           std::tuple{1.0, 1.0}));
 
 /// Three flat boxes fall a little into a sheet that is held along two edges, and stay a stack.
 TEST(Stack, StandsInAHammock) {
