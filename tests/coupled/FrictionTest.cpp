@@ -1,6 +1,7 @@
 // Coulomb's law against closed forms: sheets on inclines, balls that roll.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <tuple>
 
@@ -91,6 +92,52 @@ TEST_P(RollingBall, AcceleratesAsASolidSphereDoes) {
     EXPECT_NEAR(-double(ball.getAngularVelocity().z()) * radius, v, 0.02 * v);
 }
 INSTANTIATE_TEST_SUITE_P(Sheets, RollingBall, ::testing::Combine(::testing::Values(5, 10, 20), ::testing::Bool()));
+
+/// A ball that rolls over a flat sheet that cannot give way, as it lies on a floor or is pinned. Steps a second,
+/// whether it is pinned.
+class LevelRoll : public ::testing::TestWithParam<std::tuple<double, bool>> {
+  protected:
+    /// Most kinetic energy besides that of falling, of the start's, on a strip of 1 x 0.4 m.
+    double mostEnergy(double cell, double radius, double speed, double angle, double stepsASecond, bool isPinned) {
+        const ShellMaterial material = materials::cotton();
+        TriangleMesh mesh = makeGrid({.size = {1.0, 0.4}, .cells = {int(1.0 / cell + 0.5), int(0.4 / cell + 0.5)}});
+        mesh.positions.row(1).array() += 0.5 * material.thickness + 1e-6;
+        Scene<> scene;
+        scene.addFloor();
+        auto& sheet = scene.shells->add(mesh, material, {.friction = 1.0, .sleeping = false});
+        for (int i = 0; i < sheet.vertexCount(); ++i)
+            if (isPinned) sheet.pin(i);
+        const double mass = 0.24, h = 1.0 / stepsASecond;
+        const double height = material.thickness + radius + 1e-6;
+        auto& ball = scene.addSphere(radius, mass, btVector3(btScalar(-0.4), btScalar(height), btScalar(-0.07)));
+        ball.setFriction(1);
+        ball.setActivationState(DISABLE_DEACTIVATION);
+        scene.run(0.2, h);
+        const Vec3 along = speed * Vec3(std::cos(angle), 0, std::sin(angle));
+        ball.setLinearVelocity(Incline::toBullet(Vec3(along.x(), double(ball.getLinearVelocity().y()), along.z())));
+        ball.setAngularVelocity(Incline::toBullet(Vec3(along.z(), 0, -along.x()) / radius));
+        const int steps = int(std::min(0.75 / speed, 2.0) / h);
+        double most = 0.0;
+        for (int i = 0; i < steps; ++i) {
+            scene.step(h);
+            const Vec3 v = toVec3(ball.getLinearVelocity()), spin = radius * toVec3(ball.getAngularVelocity());
+            const double energy = v.x() * v.x() + v.z() * v.z() + 0.4 * spin.squaredNorm();
+            most = std::max(most, energy / (1.4 * speed * speed));
+        }
+        return most;
+    }
+};
+
+TEST_P(LevelRoll, GainsNoEnergy) {
+    const auto [stepsASecond, isPinned] = GetParam();
+    for (const double cell : {0.05, 0.2})
+        for (const auto& [radius, speed, angle] :
+             {std::tuple(0.05, 0.15, 0.0), std::tuple(0.12, 0.5, 0.25), std::tuple(0.3, 2.0, 0.1)})
+            EXPECT_LT(mostEnergy(cell, radius, speed, angle, stepsASecond, isPinned), 1.01)
+                << "cells of " << cell << " m, radius " << radius << " m, " << speed << " m/s";
+}
+INSTANTIATE_TEST_SUITE_P(Steps, LevelRoll,
+                         ::testing::Combine(::testing::Values(60.0, 120.0, 240.0, 480.0), ::testing::Bool()));
 
 }  // namespace
 }  // namespace jacket::bullet::testing

@@ -36,8 +36,10 @@ void ContactResponse::findAtEnd(const IslandVelocities& solved, const Points& y)
     m_endPoses.clear();
     for (const Points& end : m_end) m_endPoses.push_back(&end);
     m_found.clear();
-    m_input.contacts->find({m_endPoses, m_endTwists, m_input.h}, -m_vertexSlop, -m_faceSlop, m_found);
+    const double faceSlop = m_backed.empty() ? m_faceSlop : std::min(m_vertexSlop, m_faceSlop);
+    m_input.contacts->find({m_endPoses, m_endTwists, m_input.h}, -m_vertexSlop, -faceSlop, m_found);
     std::sort(m_found.begin(), m_found.end(), [](const Contact& a, const Contact& b) { return a.gap < b.gap; });
+    dropPassed();
 }
 
 /// The same for the solved motion, into m_found.
@@ -176,9 +178,8 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     const bool fresh = known < 0;
     const bool held = !fresh && m_touches[known].active;
     if (held && m_touches[known].jammed) return false;
-    const double slop = contact.isVertex() ? m_vertexSlop : m_faceSlop;
     const double lacks = missing(contact, known);
-    if (lacks > -slop) return false;
+    if (lacks > -slopOf(contact)) return false;
     if (!contact.isVertex() && !held) {
         if (isSaidByVertex(contact)) return false;
         // Of features that share vertices the deepest comes first, for the others may be cured with it.
@@ -219,7 +220,9 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     } else {
         const double speed = relativeVelocity(touch, solved).dot(contact.normal);
         double take = isBetweenBodies(touch) ? kAlteration * lacks : lacks;
-        if (m_onlyStops) take = lacks - std::min(0.0, lacks - m_input.h * speed);
+        const double before = std::min(0.0, lacks - m_input.h * speed);
+        if (m_onlyStops) take = lacks - before;
+        if (isBacked(contact, true)) take = lacks - before - m_input.h * speedOutOf(-before);
         touch.allowedGap += lacks - take;
         touch.target = speed - take / m_input.h;
     }
@@ -335,7 +338,7 @@ void ContactResponse::findPushes(const Points& v) {
         const int touch = touchOf(contact);
         double lacks = missing(contact, touch);
         for (int a = 0; a < 3; ++a) lacks += contact.weights[a] * contact.normal.dot(sinceFound(contact, a, v));
-        if (lacks > -(contact.isVertex() ? m_vertexSlop : m_faceSlop) || isHeld(contact)) continue;
+        if (lacks > -slopOf(contact) || isHeld(contact)) continue;
         const double by = std::min(-lacks, kMostPush * m_edge[contact.shell]);
         m_pushes.push_back({&contact, by, lacks + by});
         if (touch >= 0) found.insert(touch);

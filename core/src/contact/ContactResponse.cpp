@@ -162,7 +162,10 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     for (const Shell* shell : input.shells) m_startPoses.push_back(&shell->positions());
     m_still.assign(input.bodies.size(), Vec6::Zero());
     m_found.clear();
-    input.contacts->find({m_startPoses, m_still, 0.0}, reach, m_memory.empty() ? kNone : 10.0 * m_vertexSlop, m_found);
+    const double faceReach = mayBeBacked() ? reach : m_memory.empty() ? kNone : 10.0 * m_vertexSlop;
+    input.contacts->find({m_startPoses, m_still, 0.0}, reach, faceReach, m_found);
+    findBacked();
+    dropPassed();
     findRoomBesideFaces();
     findHeirs();
     makeRoomFor(m_found.size(), m_touches);
@@ -199,10 +202,10 @@ double ContactResponse::creepSpeed() const {
 }
 
 void ContactResponse::addAtStart(const Contact& contact, Points& y) {
+    Memory* const memory = remembered(contact);
+    if (!contact.isVertex() && !memory && !isBacked(contact)) return;  // found at the end of the step if it matters
     Touch touch = makeTouch(contact);
     touch.startGap = contact.gap;
-    Memory* const memory = remembered(contact);
-    if (!contact.isVertex() && !memory) return;  // found at the end of the step if it matters
     if (memory && memory->offset > 0.0) {
         const auto faces = m_room.find(globalVertex(contact, 0));
         const double most = faces == m_room.end() ? std::numeric_limits<double>::infinity() : faces->second;
@@ -251,6 +254,90 @@ void ContactResponse::findRoomBesideFaces() {
             if (!fresh) known->second = std::min(known->second, contact.gap);
         }
     }
+}
+
+/// Whether some vertex may be held, by a pin or another body, where a free body touches it.
+bool ContactResponse::mayBeBacked() const {
+    const bool isAnyHeld = std::any_of(m_held.begin(), m_held.end(), [](char held) { return held != 0; });
+    return hasFreeBodies() && (isAnyHeld || m_input.bodies.size() > 1);
+}
+
+/// Vertices that cannot give way to a free body, as something else holds them: a pin, or another body on the other
+/// side. There the body touches a surface that stays as it is, and its faces count from the start: found only when they
+/// are deep at the end, they would bear a body that rests by turns, and throw it.
+void ContactResponse::findBacked() {
+    m_backed.clear();
+    if (!mayBeBacked()) return;
+    std::pmr::multimap<int, const Contact*> near(&m_pool);
+    for (const Contact& contact : m_found)
+        if (contact.isVertex() && contact.gap < 10.0 * m_vertexSlop) near.emplace(globalVertex(contact, 0), &contact);
+    for (const Contact& contact : m_found) {
+        if (m_dynamicIndex[contact.body] < 0) continue;
+        for (int a = 0; a < 3; ++a) {
+            const int vertex = globalVertex(contact, a);
+            bool isBacked = m_held[vertex] != 0, isByWall = isBacked;
+            const auto [first, last] = near.equal_range(vertex);
+            for (auto other = first; other != last; ++other) {
+                if (other->second->body == contact.body || !isFacing(*other->second, contact)) continue;
+                isBacked = true;
+                isByWall = isByWall || m_dynamicIndex[other->second->body] < 0;
+            }
+            if (isBacked) m_backed.try_emplace({vertex, contact.body}, isByWall);
+        }
+    }
+}
+
+bool ContactResponse::isBacked(const Contact& contact, bool byWalls) const {
+    if (m_backed.empty()) return false;
+    for (int a = 0; a < 3; ++a) {
+        if (contact.weights[a] == 0.0) continue;
+        const auto known = m_backed.find({globalVertex(contact, a), contact.body});
+        if (known == m_backed.end() || (byWalls && !known->second)) return false;
+    }
+    return true;
+}
+
+/// With which a free body leaves a surface that it stands inside and that cannot give way [m/s]: in steps that take
+/// back a share of the depth, and never so fast that it would rise above the surface.
+double ContactResponse::speedOutOf(double depth) const {
+    return std::min(kAlteration * depth / m_input.h, std::sqrt(std::max(m_input.gravity.norm(), 1e-3) * depth));
+}
+
+/// Takes out of what was found the vertices and edges that a free body cannot move, and beside which it is nearer to a
+/// face, another way: not there do they touch. A ball that has rolled over them would be pushed on by them, and one
+/// that comes to them would be held back. Where a sheet gives way it follows the body, and its vertices bear.
+void ContactResponse::dropPassed() {
+    if (m_backed.empty()) return;
+    std::pmr::multimap<std::pair<int, int>, const Contact*> faces(&m_pool);  // of vertex and body
+    for (const Contact& contact : m_found)
+        for (int a = 0; a < 3 && !contact.isVertex(); ++a)
+            faces.emplace(std::pair(globalVertex(contact, a), contact.body), &contact);
+    const auto isPassed = [&](const Contact& contact) {
+        Eigen::Index corner = 0;
+        contact.weights.maxCoeff(&corner);
+        const auto [first, last] = faces.equal_range({globalVertex(contact, int(corner)), contact.body});
+        return std::any_of(first, last, [&](const auto& face) { return isBeside(contact, *face.second); });
+    };
+    std::pmr::vector<Contact> kept(&m_pool);
+    for (const Contact& contact : m_found)
+        if (!isBacked(contact) || !isPassed(contact)) kept.push_back(contact);
+    m_found.assign(kept.begin(), kept.end());
+}
+
+/// Whether a face that has all vertices of a contact is nearer than this, another way.
+bool ContactResponse::isBeside(const Contact& contact, const Contact& face) {
+    constexpr double kNearer = 1e-8;   // what is nearer by less is as near [m]
+    constexpr double kSameWay = 1e-9;  // 1 less the cosine of the angle below which normals are the same
+    if (face.gap >= contact.gap - kNearer || face.normal.dot(contact.normal) > 1.0 - kSameWay) return false;
+    for (int a = 0; a < 3; ++a)
+        if (contact.weights[a] > 0.0 &&
+            std::count(face.vertices.begin(), face.vertices.end(), contact.vertices[a]) == 0)
+            return false;
+    return true;
+}
+
+double ContactResponse::slopOf(const Contact& contact) const {
+    return contact.isVertex() || isBacked(contact) ? m_vertexSlop : m_faceSlop;
 }
 
 /// Bodies that move farther relative to some vertex than they are thick, or free ones half as far: from inside them the
@@ -317,6 +404,11 @@ double ContactResponse::timeOfTouch(const Touch& touch) const {
 
 void ContactResponse::alter(Touch& touch, Points& y) const {
     const Contact& c = touch.contact;
+    if (isBacked(c, true)) {
+        touch.target = speedOutOf(-c.gap);
+        touch.allowedGap = std::min(0.0, c.gap + m_input.h * touch.target);
+        return;
+    }
     const double by = std::min(-kAlteration * c.gap, kAlteration * m_edge[c.shell]);
     if (isHeld(c)) return;
     const double spread = c.weights.squaredNorm();
