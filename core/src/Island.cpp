@@ -280,6 +280,8 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const int n = input.shells[k]->vertexCount();
         start.middleCols(offsets[k], n) = input.shells[k]->velocities();
+        for (int i = 0; input.isCalm && i < n; ++i)
+            if (!input.shells[k]->isPinned(i)) start.col(offsets[k] + i).setZero();
     }
     y.setZero(3, count);
     isTwoStep = false;

@@ -14,6 +14,9 @@ namespace jacket::bullet {
 namespace {
 
 constexpr double kAtRest = 0.01;     // of the mean edge: a vertex that moves no farther keeps its place
+constexpr double kHanging = 0.2;     // of the mean edge: the same of one that comes back to it
+constexpr double kDrift = 0.1;       // of the mean edge: the same of where it comes back to
+constexpr double kMemory = 0.5;      // over which its place is averaged [s]
 constexpr double kNearlyCalm = 0.9;  // of gDeactivationTime: as far as a body that touches an awake shell gets
 constexpr double kSlow = 0.01;       // a body slower than this wakes no shell that it comes near [m/s]
 
@@ -21,6 +24,14 @@ bool samePose(const btTransform& a, const btTransform& b) {
     return (a.getOrigin() - b.getOrigin()).length2() < btScalar(1e-12) &&
            (a.getBasis()[0] - b.getBasis()[0]).length2() + (a.getBasis()[1] - b.getBasis()[1]).length2() <
                btScalar(1e-12);
+}
+
+double farthest(const Points& a, const Points& b) {
+    return (a - b).colwise().norm().maxCoeff();
+}
+
+double waitForCalm() {
+    return std::max(double(gDeactivationTime), 3.0 * kMemory);
 }
 
 /// Whether it stands still until something wakes it.
@@ -153,9 +164,9 @@ void Sleepers::rest(const Vec3& gravity, double h) {
     std::pmr::vector<Candidate> candidates(&m_memory);
     for (const auto& shell : m_shells) {
         ShellRest& rest = *shell->m_rest;
-        if (std::exchange(rest.wakeAsked, false)) rest.place.resize(3, 0);
+        if (std::exchange(rest.wakeAsked, false)) rest.vertices.forget(), rest.means.forget();
         if (rest.asleep) continue;
-        candidates.push_back({shell.get(), supportsOf(*shell), keepsPlace(*shell, h)});
+        candidates.push_back({shell.get(), supportsOf(*shell), keepsPlace(*shell, gravity, h)});
         for (btCollisionObject* object : candidates.back().supports) keepAwake(*object, candidates.back().ready);
     }
     dropRestless(candidates);
@@ -165,7 +176,6 @@ void Sleepers::rest(const Vec3& gravity, double h) {
         c.shell->fallAsleep();
         rest.asleep = true;
         rest.revision = c.shell->shell().revision();
-        rest.gravity = gravity;
         for (btCollisionObject* object : c.supports) {
             jacket::bullet::fallAsleep(*object);
             rest.supports.push_back({object, object->getBroadphaseHandle()->getUid(), object->getWorldTransform(),
@@ -174,18 +184,43 @@ void Sleepers::rest(const Vec3& gravity, double h) {
     }
 }
 
-/// Whether no vertex has left its place for as long as Bullet waits.
-bool Sleepers::keepsPlace(ShellBody& shell, double h) const {
+void RestingPlace::follow(const Points& points, double room, double h) {
+    if (place.cols() != points.cols() || farthest(points, place) > room) {
+        place = points;
+        since = 0.0;
+    }
+    since += h;
+}
+
+/// Whether no vertex has left its place for as long as Bullet waits; or what goes on moving about it though it starts
+/// from standing still in every step, which comes no closer to rest.
+bool Sleepers::keepsPlace(ShellBody& shell, const Vec3& gravity, double h) const {
     ShellRest& rest = *shell.m_rest;
     if (!shell.options().sleeping) return false;
     const Points& x = shell.shell().positions();
     const double room = kAtRest * shell.shell().meanEdge();
-    if (rest.place.cols() != x.cols() || (x - rest.place).colwise().squaredNorm().maxCoeff() > room * room) {
-        rest.place = x;
-        rest.quiet = 0.0;
+    rest.vertices.follow(x, room, h);
+    const bool isAsBefore = rest.gravity == gravity && rest.revision == shell.shell().revision();
+    rest.gravity = gravity;
+    rest.revision = shell.shell().revision();
+    if (!isAsBefore || rest.mean.cols() != x.cols() || farthest(x, rest.mean) > kHanging * shell.shell().meanEdge()) {
+        rest.mean = x;
+        rest.means.forget();
     }
-    rest.quiet += h;
-    return rest.quiet >= double(gDeactivationTime);
+    rest.mean += std::min(1.0, h / kMemory) * (x - rest.mean);
+    rest.means.follow(rest.mean, kDrift * shell.shell().meanEdge(), h);
+    return rest.vertices.since >= double(gDeactivationTime) || rest.damped >= 2.0 * waitForCalm();
+}
+
+bool Sleepers::isCalm(const Island& island) {
+    const double wait = waitForCalm();
+    const auto hangs = [&](const ShellBody* shell) {
+        return shell->options().sleeping && shell->m_rest->means.place.cols() > 0 && shell->m_rest->means.since >= wait;
+    };
+    return !gDisableDeactivation && !island.pairs.empty() &&
+           std::all_of(island.obstacles.begin(), island.obstacles.end(),
+                       [](const Obstacle& obstacle) { return standsStill(*obstacle.object); }) &&
+           std::all_of(island.shells.begin(), island.shells.end(), hangs);
 }
 
 /// A shell stays awake with any body that it touches, and that with any shell that it touches.
@@ -197,7 +232,8 @@ void Sleepers::dropRestless(std::span<Candidate> candidates) const {
             if (!c.ready) awake.insert(awake.end(), c.supports.begin(), c.supports.end());
         for (Candidate& c : candidates) {
             const bool restless = std::any_of(c.supports.begin(), c.supports.end(), [&](const btCollisionObject* o) {
-                return !isCalm(*o) || (!sleeps(*o) && std::find(awake.begin(), awake.end(), o) != awake.end());
+                return !jacket::bullet::isCalm(*o) ||
+                       (!sleeps(*o) && std::find(awake.begin(), awake.end(), o) != awake.end());
             });
             if (!c.ready || !restless) continue;
             c.ready = false;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "support/BulletScene.h"
@@ -58,6 +59,51 @@ TEST(Sleeping, ASheetOnTheFloorFallsAsleep) {
     scene.step(kStep);
     EXPECT_EQ(scene.shells->lastStep().awake, 0);
     EXPECT_EQ(sheet.shell().velocities().norm(), 0.0);
+}
+
+std::unique_ptr<btCollisionShape> thingToDrape(const std::string& name) {
+    const btScalar half = btScalar(0.3);
+    if (name == "box") return std::make_unique<btBoxShape>(btVector3(half, half, half));
+    if (name == "sphere") return std::make_unique<btSphereShape>(half);
+    if (name == "cylinder") return std::make_unique<btCylinderShape>(btVector3(half, half, half));
+    return std::make_unique<btCapsuleShapeZ>(btScalar(0.2), half);
+}
+
+/// Cloth over what never moves: vertices along its edges leave it and come back to it by turns, which the few rounds of
+/// contacts among walls do not end, and shake what hangs from them.
+class Drape : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(Drape, FallsAsleep) {
+    for (const ShellMaterial& material : {materials::cotton(), materials::denim()})
+        for (const double aside : {0.0, 0.037}) {
+            Scene scene;
+            scene.addBody(thingToDrape(GetParam()), 0.0, btVector3(btScalar(aside), btScalar(-0.32), 0));
+            const ShellBody& cloth = scene.shells->add(sheetAt(1.0, 10, 0.0), material);
+            EXPECT_GT(timeToSleep(scene, cloth, 60.0), 1.0)
+                << material.areaDensity() << " kg/m2, " << aside << " m aside";
+            EXPECT_GT(cloth.shell().positions().row(1).minCoeff(), -1.0);  // it has not slid off
+        }
+}
+INSTANTIATE_TEST_SUITE_P(Shapes, Drape, ::testing::Values("box", "sphere", "cylinder", "capsule"));
+
+/// What is at rest but for noise is damped, not what begins to move: when gravity turns, a cloth that hangs over a ball
+/// slides about as far as one that is never damped.
+TEST(Sleeping, AClothThatHasCalmedDownIsAsFreeAsBefore) {
+    const auto wayAfterTurn = [](double calmFor, bool sleeping) {
+        Scene scene;
+        scene.addBody(thingToDrape("sphere"), 0.0, btVector3(0, btScalar(-0.32), 0));
+        const ShellBody& cloth = scene.shells->add(sheetAt(1.0, 10, 0.0), materials::cotton(), {.sleeping = sleeping});
+        scene.run(calmFor, kStep);
+        const double start = cloth.shell().positions().row(0).mean();
+        scene.world.setGravity(btVector3(btScalar(7.0), btScalar(-7.0), 0));
+        scene.run(0.5, kStep);
+        return cloth.shell().positions().row(0).mean() - start;
+    };
+    for (const double calmFor : {3.0, 5.0, 20.0}) {
+        const double way = wayAfterTurn(calmFor, false);
+        EXPECT_GT(way, 0.05);
+        EXPECT_GT(wayAfterTurn(calmFor, true), 0.7 * way);  // folds that lie otherwise make a difference
+    }
 }
 
 /// Sheets that land on a corner fold somewhere, each another way; vertices that friction turns around by turns must not

@@ -18,10 +18,11 @@ struct IslandInput {
     std::span<const RigidContact> rigidContacts{};
     std::span<Anchor> anchors{};          ///< at most one of a vertex; `impulse` is written
     ContactDetector* contacts = nullptr;  ///< none: no contacts
-    bool inOnePiece = false;              ///< some body can move by nothing but one twist in a step
-    double restingSpeed = 0.2;            ///< contacts that close no faster do not bounce [m/s]
-    double (*clock)() = nullptr;          ///< [s]; null: no times are taken
-    WorkerTeam* team = nullptr;           ///< shares the work of large islands; the same bits with and without
+    bool isCalm = false;  ///< shells keep their places but for what solves leave over: they start from standing still
+    bool inOnePiece = false;      ///< some body can move by nothing but one twist in a step
+    double restingSpeed = 0.2;    ///< contacts that close no faster do not bounce [m/s]
+    double (*clock)() = nullptr;  ///< [s]; null: no times are taken
+    WorkerTeam* team = nullptr;   ///< shares the work of large islands; the same bits with and without
 };
 
 /// Solves for the velocities of one step: A v = b with contacts as filter, bodies as six unknowns each (see

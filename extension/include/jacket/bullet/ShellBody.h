@@ -37,7 +37,9 @@ struct ShellOptions {
     int collisionMask = -1;              ///< btBroadphaseProxy::AllFilter
     double contactThickness = -1.0;      ///< distance kept from surfaces [m]; < 0: half the shell's thickness
     Preconditioner preconditioner = Preconditioner::IncompleteCholesky;
-    bool sleeping = true;  ///< whether it may fall asleep: once no vertex has moved by 1 % of an edge for a while
+    /// Whether it may fall asleep: once no vertex has moved by 1 % of an edge for a while. Over bodies that never move,
+    /// one whose vertices only hang about such places is damped until they stay there.
+    bool sleeping = true;
 };
 
 class ShellWorld;
@@ -52,7 +54,7 @@ struct BodyContact : ContactImpulse {
 };
 
 /// What test writers can hold a shell to: in every step, what it gains is what it was given, by gravity, by what is
-/// noted here, and by forces, pressure, wind, mass damping and pins, which are not.
+/// noted here, and by forces, pressure, wind, damping (of one that is about to sleep, too) and pins, which are not.
 struct ShellLedger {
     ShellEnergy energy;             ///< as it is when its momentum is `momentum`, and plastic work so far [J]
     double frictionLoss = 0.0;      ///< heat of sliding over bodies so far [J]
