@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "ObjectId.h"
+#include "jacket/Island.h"
 
 namespace jacket::bullet {
 namespace {
@@ -17,6 +18,12 @@ Eigen::Matrix<double, 3, 6> motionOf(const Vec3& arm) {
     rows << Mat3::Identity(), Mat3::Zero();
     for (int k = 0; k < 3; ++k) rows.col(3 + k) = Vec3::Unit(k).cross(arm);
     return rows;
+}
+
+/// About what moving one vertex of a shell strains it by while its neighbours stay [J].
+double strainOf(const Shell& shell, const Vec3& by) {
+    constexpr double kNeighbourhood = 4.0;  // stiffness against that, in E t
+    return 0.5 * kNeighbourhood * shell.material().stretchStiffness() * by.squaredNorm();
 }
 
 }  // namespace
@@ -42,10 +49,10 @@ void CarriedVertices::move(const btCollisionWorld& world, const Vec3& gravity, d
     for (ShellBody* body : m_shells) {
         findShifts(*body, world, h);
         Shell& shell = body->m_shell;
-        if (shell.isStiff(h))
-            moveAsOne(*body, m_shifts);
-        else
-            spare(*body, gravity, h);
+        const bool isStiff = shell.isStiff(h);
+        if (isStiff) moveAsOne(*body, m_shifts);
+        bringAlong(*body, gravity, h);
+        if (!isStiff) spare(*body, gravity, h);
         for (const auto& [carried, by] : m_shifts) shell.displace(carried->vertex, by);
     }
     m_vertices.clear();
@@ -62,20 +69,69 @@ void CarriedVertices::findShifts(const ShellBody& shell, const btCollisionWorld&
     }
 }
 
+/// Where a body was stopped, or struck, a vertex that alone followed it would tear at the shell. If that is more than
+/// its energy allows for, all of the shell follows, by its inertia and its stiffness, as in a step from standing still
+/// in which what is tied is led to its anchor. Velocities stay as they are. What even that would strain by more than
+/// its energy is left to the next solve.
+void CarriedVertices::bringAlong(ShellBody& body, const Vec3& gravity, double h) {
+    constexpr double kLittle = 0.01;  // of the energy of motion
+    Shell& shell = body.m_shell;
+    double stretching = 0.0;
+    body.m_ahead = shell.positions();
+    for (const auto& [carried, by] : m_shifts) {
+        if (!carried->anchor) continue;
+        stretching += strainOf(shell, by);
+        body.m_ahead.col(carried->vertex) += by;
+    }
+    const double moving = energyOfMotion(shell, gravity, h);
+    if (stretching <= kLittle * moving) return;
+    const double before = shell.elasticEnergy(shell.positions());
+    if (shell.elasticEnergy(body.m_ahead) <= before + kLittle * moving) return;
+    std::vector<CoupledBody> leaders;
+    std::vector<Anchor> led;
+    for (const auto& [carried, by] : m_shifts) {
+        if (!carried->anchor) continue;
+        led.push_back({0, carried->vertex, static_cast<int>(leaders.size()), shell.positions().col(carried->vertex)});
+        CoupledBody& leader = leaders.emplace_back();
+        leader.prescribed = true;
+        leader.freeTwist.head<3>() = by / h;
+    }
+    const Points velocities = shell.velocities();
+    shell.setVelocities(Points::Zero(3, shell.vertexCount()));
+    Shell* const one = &shell;
+    IslandSolver solver;
+    const IslandInput input{.h = h, .gravity = gravity, .shells = {&one, 1}, .bodies = leaders, .anchors = led};
+    const bool isFinite = solver.solve(input).finite;
+    body.m_ahead = shell.positions() + h * shell.velocities();
+    for (auto& [carried, by] : m_shifts) {
+        if (!carried->anchor) continue;
+        body.m_ahead.col(carried->vertex) = shell.positions().col(carried->vertex) + by;
+        by -= h * shell.velocities().col(carried->vertex);  // what the solve has left over
+    }
+    if (isFinite && shell.elasticEnergy(body.m_ahead) <= before + moving)
+        for (int i = 0; i < shell.vertexCount(); ++i) shell.displace(i, h * shell.velocities().col(i));
+    else
+        std::erase_if(m_shifts, [](const Shift& shift) { return shift.carried->anchor.has_value(); });
+    shell.setVelocities(velocities);
+}
+
+/// Or what gravity would give it in a step, if it rests [J].
+double CarriedVertices::energyOfMotion(const Shell& shell, const Vec3& gravity, double h) {
+    return 0.5 * shell.masses().dot(shell.velocities().colwise().squaredNorm().transpose()) +
+           0.5 * shell.masses().sum() * (h * gravity).squaredNorm();
+}
+
 /// Where bodies have done something else by far, what touches them would strain the shell by it, by any amount. It goes
 /// along as far as that does not double the shell's energy, and if it cannot go all of the way, along the normals
 /// alone: what is left of the way the next solve sees, as a gap or a depth, with what it costs.
 void CarriedVertices::spare(ShellBody& body, const Vec3& gravity, double h) {
-    constexpr double kNeighbourhood = 4.0;  // stiffness against moving one vertex alone, in E t
     constexpr int kMostHalvings = 6;
     const Shell& shell = body.m_shell;
     double stretching = 0.0;
     for (const auto& [carried, by] : m_shifts)
-        if (!carried->anchor)
-            stretching += 0.5 * kNeighbourhood * shell.material().stretchStiffness() * by.squaredNorm();
+        if (!carried->anchor) stretching += strainOf(shell, by);
     if (stretching == 0.0) return;
-    const double moving = 0.5 * shell.masses().dot(shell.velocities().colwise().squaredNorm().transpose()) +
-                          0.5 * shell.masses().sum() * (h * gravity).squaredNorm();
+    const double moving = energyOfMotion(shell, gravity, h);
     if (stretching <= moving) return;
     const double before = energyAfter(body, 0.0), most = moving + 2.0 * before;
     if (energyAfter(body, 1.0) <= most) return;

@@ -35,7 +35,9 @@ class CarriedVertices {
         Vec3 by;  ///< [m]
     };
     void findShifts(const ShellBody& shell, const btCollisionWorld& world, double h);
+    static double energyOfMotion(const Shell& shell, const Vec3& gravity, double h);
     static void moveAsOne(ShellBody& shell, std::vector<Shift>& shifts);
+    void bringAlong(ShellBody& shell, const Vec3& gravity, double h);
     void spare(ShellBody& shell, const Vec3& gravity, double h);
     double energyAfter(ShellBody& shell, double share) const;
 

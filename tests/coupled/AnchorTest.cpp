@@ -10,6 +10,8 @@
 namespace jacket::bullet::testing {
 namespace {
 
+using jacket::testing::energy;
+using jacket::testing::energyGain;
 using jacket::testing::Scene;
 using jacket::testing::totalMomentum;
 
@@ -202,6 +204,49 @@ TEST(Anchors, WakeASleepingShell) {
     ASSERT_TRUE(sheet.isAsleep());
     sheet.unanchor(48);
     EXPECT_FALSE(sheet.isAsleep());
+}
+
+/// A sheet that hangs beside a post, tied by a vertex to a body that falls on the post.
+struct Landing : Scene<> {
+    static constexpr double kSize = 0.08;
+    btRigidBody* body;
+    ShellBody* sheet;
+    double fall;  ///< energy of it [J]
+
+    Landing(const ShellMaterial& material, bool isBox, double mass, double height, bool byCorner) {
+        addBox(btVector3(btScalar(0.15), 3, btScalar(0.15)), 0.0, btVector3(0, -3, 0));
+        const btVector3 place(0, btScalar(height + kSize), 0);
+        const btVector3 halfExtents = btScalar(kSize) * btVector3(1, 1, 1);
+        body = isBox ? &addBox(halfExtents, mass, place) : &addSphere(kSize, mass, place);
+        TriangleMesh mesh = squareSheet(1, 10);
+        const Points flat = mesh.positions;
+        const int vertex = byCorner ? 110 : 115;  // of the last row
+        mesh.positions.row(0).array() += 0.01 - flat(0, vertex);
+        mesh.positions.row(1).array() += height + kSize - (flat.row(2).array() - flat(2, vertex)).abs();
+        mesh.positions.row(2).setConstant(0.2);
+        sheet = &shells->add(mesh, material, {.plasticity = true});
+        sheet->anchor(vertex, *body);
+        fall = (mass + sheet->shell().masses().sum()) * 9.81 * height;
+    }
+};
+
+/// Bullet stops a body of which the shells' solve knew only that it falls.
+TEST(Anchors, KeepEnergyWhereABodyLandsHard) {
+    for (const bool isBox : {false, true})
+        for (const bool byCorner : {false, true})
+            for (const double height : {0.5, 1.3}) {
+                Landing cloth(materials::cotton(), isBox, 10.0, height, byCorner);
+                EXPECT_LT(energyGain(cloth, 0.8, kStep), 0.02 * cloth.fall) << isBox << byCorner << height;
+            }
+}
+
+TEST(Anchors, DentMetalByNoMoreThanTheFallWhereABodyLandsHard) {
+    for (const bool byCorner : {false, true})
+        for (const double height : {0.5, 1.3}) {
+            Landing scene(materials::steel(1e-3), true, 10.0, height, byCorner);
+            scene.run(0.8, kStep);
+            EXPECT_LT(energy(scene).plasticWork, 0.1 * scene.fall) << byCorner << height;
+        }
 }
 
 }  // namespace
