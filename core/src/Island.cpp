@@ -185,6 +185,7 @@ struct IslandSolver::Impl {
     bool wouldBeStrained(const IslandInput& input);
     void pushOut(const IslandInput& input, StepReport& report);
     void balance(const IslandInput& input, std::vector<ContactImpulse>& impulses);
+    Vec6 excessOf(int body, const Vec6& residual) const;
     void shift(const IslandInput& input, std::span<const Vec3> onShells, std::vector<ContactImpulse>& impulses);
     bool giveToWalls(const IslandInput& input, int shell, const Vec3& impulse,
                      std::vector<ContactImpulse>& impulses) const;
@@ -977,25 +978,50 @@ void IslandSolver::Impl::balance(const IslandInput& input, std::vector<ContactIm
     const auto count = input.bodies.size();
     std::pmr::vector<Vec6> onBodies(count, Vec6::Zero(), &pool);
     std::pmr::vector<double> pressed(count, 0.0, &pool);
+    const auto add = [&](int body, const Vec3& impulse, const Vec3& arm) {
+        onBodies[body] -= pointImpulse(impulse, arm);
+        pressed[body] += impulse.norm();
+    };
+    std::pmr::vector<char> isTouched(count, 0, &pool);
     for (const auto& [contact, impulse, sticks, slip] : impulses) {
-        onBodies[contact.body] -= pointImpulse(impulse, contactArm(input, contact));
-        pressed[contact.body] += impulse.norm();
+        add(contact.body, impulse, contactArm(input, contact));
+        isTouched[contact.body] = 1;
+    }
+    for (Anchor& anchor : input.anchors) {
+        anchor.impulse = impulseShare * unfiltered().col(offsets[anchor.shell] + anchor.vertex);
+        add(anchor.body, -anchor.impulse, anchor.point - input.bodies[anchor.body].position);
+    }
+    for (std::size_t b = 0; b < count; ++b) {
+        Vec6& impulse = input.bodies[b].impulse;
+        if (input.bodies[b].prescribed || !(pressed[b] > 0.0))
+            impulse = onBodies[b];
+        else if (!isTouched[b])
+            impulse -= excessOf(static_cast<int>(b), impulse - onBodies[b]);
     }
     std::pmr::vector<Vec3> onShells(input.shells.size(), Vec3::Zero(), &pool);
-    for (Anchor& anchor : input.anchors) {
-        const Vec3 impulse = -impulseShare * unfiltered().col(offsets[anchor.shell] + anchor.vertex);
-        anchor.impulse = -impulse;
-        onBodies[anchor.body] -= pointImpulse(impulse, anchor.point - input.bodies[anchor.body].position);
-        onShells[anchor.shell] += impulse;
-    }
-    for (std::size_t b = 0; b < count; ++b)
-        if (input.bodies[b].prescribed || !(pressed[b] > 0.0)) input.bodies[b].impulse = onBodies[b];
+    const auto missing = [&](int body, const Vec3& impulse) -> Vec3 {
+        if (!(pressed[body] > 0.0)) return Vec3::Zero();
+        const Vec3 all = input.bodies[body].impulse.head<3>() - onBodies[body].head<3>();
+        return all * (impulse.norm() / pressed[body]);
+    };
     for (auto& [contact, impulse, sticks, slip] : impulses) {
-        const Vec3 missing = input.bodies[contact.body].impulse.head<3>() - onBodies[contact.body].head<3>();
-        if (pressed[contact.body] > 0.0) impulse -= missing * (impulse.norm() / pressed[contact.body]);
+        impulse -= missing(contact.body, impulse);
         onShells[contact.shell] += impulse;
     }
+    for (Anchor& anchor : input.anchors) {
+        anchor.impulse += missing(anchor.body, anchor.impulse);
+        onShells[anchor.shell] -= anchor.impulse;
+    }
     shift(input, onShells, impulses);
+}
+
+/// What of a change of momentum is to be taken back so that a body's equations, of which the solve has left `residual`
+/// over, are fulfilled with the shells' velocities around it. Neither what its anchors give it nor its solved change of
+/// momentum would do: a light body far from its anchor would spin by that, and one that rests on something would be
+/// lifted off it.
+Vec6 IslandSolver::Impl::excessOf(int body, const Vec6& residual) const {
+    const int dynamic = dynamicIndex[body];
+    return supports.masses()[dynamic] * preconditioner.twistBy(dynamic, residual);
 }
 
 /// The shells' part of it. Walls take what is missing: a shell that they hold is stiff, and its mass would turn little

@@ -249,5 +249,24 @@ TEST(Anchors, DentMetalByNoMoreThanTheFallWhereABodyLandsHard) {
         }
 }
 
+/// A light box that is tied to a sheet far from it, and flies by: what the solve leaves over, times the lever, is a
+/// spin of many turns a second.
+TEST(Anchors, SpinNoLightBodyFarFromThem) {
+    for (const double lever : {0.7, 1.9})
+        for (const btVector3& velocity : {btVector3(3, -4, 0), btVector3(4, 3, 0), btVector3(2, 1, 4)}) {
+            Scene scene(0.0);
+            auto& sheet = scene.shells->add(squareSheet(1, 6), trampolineCloth());
+            const btVector3 arm(btScalar(0.8 * lever), btScalar(0.6 * lever), 0);
+            auto& box = scene.addBox(btVector3(btScalar(0.05), btScalar(0.05), btScalar(0.05)), 0.05,
+                                     sheet.positions()[48] + arm);
+            sheet.anchor(48, box);
+            box.setLinearVelocity(velocity);
+            const double start = energy(scene).total();
+            const Vec3 momentum = totalMomentum(scene);
+            EXPECT_LT(energyGain(scene, 1.0, kStep), 0.05 * start) << lever;
+            EXPECT_LT((totalMomentum(scene) - momentum).norm(), bulletTolerance(1e-9, 1e-5));
+        }
+}
+
 }  // namespace
 }  // namespace jacket::bullet::testing

@@ -34,6 +34,8 @@ class CoupledPreconditioner {
     bool isCoarse(const CoupledSystem& system) const;
     /// Whether some shell is factored completely.
     bool isComplete() const;
+    /// What an impulse does to a body's twist where the vertices that it carries hang on others that stay.
+    Vec6 twistBy(int body, const Vec6& impulse) const { return m_bodies[body].solve(impulse); }
 
   private:
     /// Bodies that couplings join, directly or through others.
