@@ -13,10 +13,10 @@
 namespace jacket::bullet {
 namespace {
 
-constexpr double kAtRest = 0.01;     // of the mean edge: a vertex that moves no farther keeps its place
-constexpr double kHanging = 0.2;     // of the mean edge: the same of one that comes back to it
-constexpr double kDrift = 0.1;       // of the mean edge: the same of where it comes back to
-constexpr double kMemory = 0.5;      // over which its place is averaged [s]
+constexpr double kAtRest = 0.01;  // of the mean edge: a vertex that moves no farther keeps its place
+constexpr double kSlowShell =
+    0.03;                       // of sqrt(g L), L: the side of the shell: as fast as what flickers may be, on average
+constexpr double kFall = 2e-4;  // of m g L: what falls by less keeps its energy
 constexpr double kNearlyCalm = 0.9;  // of gDeactivationTime: as far as a body that touches an awake shell gets
 constexpr double kSlow = 0.01;       // a body slower than this wakes no shell that it comes near [m/s]
 
@@ -26,12 +26,8 @@ bool samePose(const btTransform& a, const btTransform& b) {
                btScalar(1e-12);
 }
 
-double farthest(const Points& a, const Points& b) {
-    return (a - b).colwise().norm().maxCoeff();
-}
-
 double waitForCalm() {
-    return std::max(double(gDeactivationTime), 3.0 * kMemory);
+    return std::max(double(gDeactivationTime), 1.5);
 }
 
 /// Whether it stands still until something wakes it.
@@ -164,9 +160,10 @@ void Sleepers::rest(const Vec3& gravity, double h) {
     std::pmr::vector<Candidate> candidates(&m_memory);
     for (const auto& shell : m_shells) {
         ShellRest& rest = *shell->m_rest;
-        if (std::exchange(rest.wakeAsked, false)) rest.vertices.forget(), rest.means.forget();
+        if (std::exchange(rest.wakeAsked, false)) rest.place.resize(3, 0), rest.level = 0.0;
         if (rest.asleep) continue;
-        candidates.push_back({shell.get(), supportsOf(*shell), keepsPlace(*shell, gravity, h)});
+        candidates.push_back({shell.get(), supportsOf(*shell), keepsPlace(*shell, h)});
+        if (shell->options().sleeping) followEnergy(*shell, gravity, h);
         for (btCollisionObject* object : candidates.back().supports) keepAwake(*object, candidates.back().ready);
     }
     dropRestless(candidates);
@@ -184,43 +181,51 @@ void Sleepers::rest(const Vec3& gravity, double h) {
     }
 }
 
-void RestingPlace::follow(const Points& points, double room, double h) {
-    if (place.cols() != points.cols() || farthest(points, place) > room) {
-        place = points;
-        since = 0.0;
-    }
-    since += h;
-}
-
-/// Whether no vertex has left its place for as long as Bullet waits; or what goes on moving about it though it starts
-/// from standing still in every step, which comes no closer to rest.
-bool Sleepers::keepsPlace(ShellBody& shell, const Vec3& gravity, double h) const {
+/// Whether no vertex has left its place for as long as Bullet waits; or what goes on moving though it starts from
+/// standing still in every step, which comes no closer to rest.
+bool Sleepers::keepsPlace(ShellBody& shell, double h) const {
     ShellRest& rest = *shell.m_rest;
     if (!shell.options().sleeping) return false;
     const Points& x = shell.shell().positions();
     const double room = kAtRest * shell.shell().meanEdge();
-    rest.vertices.follow(x, room, h);
-    const bool isAsBefore = rest.gravity == gravity && rest.revision == shell.shell().revision();
-    rest.gravity = gravity;
-    rest.revision = shell.shell().revision();
-    if (!isAsBefore || rest.mean.cols() != x.cols() || farthest(x, rest.mean) > kHanging * shell.shell().meanEdge()) {
-        rest.mean = x;
-        rest.means.forget();
+    if (rest.place.cols() != x.cols() || (x - rest.place).colwise().squaredNorm().maxCoeff() > room * room) {
+        rest.place = x;
+        rest.quiet = 0.0;
     }
-    rest.mean += std::min(1.0, h / kMemory) * (x - rest.mean);
-    rest.means.follow(rest.mean, kDrift * shell.shell().meanEdge(), h);
-    return rest.vertices.since >= double(gDeactivationTime) || rest.damped >= 2.0 * waitForCalm();
+    rest.quiet += h;
+    return rest.quiet >= double(gDeactivationTime) || rest.damped >= 2.0 * waitForCalm();
+}
+
+void Sleepers::followEnergy(ShellBody& body, const Vec3& gravity, double h) const {
+    ShellRest& rest = *body.m_rest;
+    const Shell& shell = body.shell();
+    const bool isAsBefore = rest.gravity == gravity && rest.revision == shell.revision();
+    rest.gravity = gravity;
+    rest.revision = shell.revision();
+    const double mass = shell.masses().sum(), weightTimesSide = mass * gravity.norm() * shell.side();
+    const double kinetic = 0.5 * shell.masses().dot(shell.velocities().colwise().squaredNorm().transpose());
+    if (!isAsBefore || body.contacts().empty() || !(kinetic < 0.5 * kSlowShell * kSlowShell * weightTimesSide)) {
+        rest.level = 0.0;
+        return;
+    }
+    const double energy =
+        kinetic + shell.elasticEnergy(shell.positions()) - gravity.dot(shell.positions() * shell.masses());
+    if (rest.level == 0.0 || energy < rest.lowest - kFall * weightTimesSide) {
+        rest.lowest = energy;
+        rest.level = 0.0;
+    }
+    rest.level += h;
 }
 
 bool Sleepers::isCalm(const Island& island) {
     const double wait = waitForCalm();
-    const auto hangs = [&](const ShellBody* shell) {
-        return shell->options().sleeping && shell->m_rest->means.place.cols() > 0 && shell->m_rest->means.since >= wait;
+    const auto isLevel = [&](const ShellBody* shell) {
+        return shell->options().sleeping && shell->m_rest->level >= wait;
     };
     return !gDisableDeactivation && !island.pairs.empty() &&
            std::all_of(island.obstacles.begin(), island.obstacles.end(),
                        [](const Obstacle& obstacle) { return standsStill(*obstacle.object); }) &&
-           std::all_of(island.shells.begin(), island.shells.end(), hangs);
+           std::all_of(island.shells.begin(), island.shells.end(), isLevel);
 }
 
 /// A shell stays awake with any body that it touches, and that with any shell that it touches.

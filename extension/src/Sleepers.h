@@ -12,22 +12,14 @@
 
 namespace jacket::bullet {
 
-/// Points that may stay where they are.
-struct RestingPlace {
-    Points place;        ///< where they were when it began [m]
-    double since = 0.0;  ///< for how long none has left its place [s]
-    /// Takes a step; `room`: how far from its place none has left it [m].
-    void follow(const Points& points, double room, double h);
-    void forget() { place.resize(3, 0); }
-};
-
 /// What a shell needs to fall asleep and to know when to wake.
 struct ShellRest {
     bool asleep = false;
     bool wakeAsked = false;       ///< by the user, since the last step
-    RestingPlace vertices;        ///< as they are
-    Points mean;                  ///< where they were on average of late [m]
-    RestingPlace means;           ///< as those are
+    double quiet = 0.0;           ///< for how long no vertex has left its place [s]
+    Points place;                 ///< where the vertices were when it began [m]
+    double lowest = 0.0;          ///< energy since it has been slow, that of its height too [J]
+    double level = 0.0;           ///< for how long that has not fallen [s]
     double damped = 0.0;          ///< for how long it has been, see Sleepers::isCalm [s]
     unsigned revision = 0;        ///< of the shell in the last step that it was awake in
     Vec3 gravity = Vec3::Zero();  ///< the world's then [m/s^2]
@@ -54,8 +46,9 @@ class Sleepers {
     void rest(const Vec3& gravity, double h);
     /// Together with the bodies that it touched.
     void wakeUp(ShellBody& shell);
-    /// Whether an island's shells hang about their places for good, moved only by what the solves of contacts with
-    /// walls leave over: vertices that go on leaving a body and coming back to it.
+    /// Whether an island's shells are slow, have bodies around them that never move, and lose no energy: what moves
+    /// them still is what the solves of contacts leave over, as vertices go on leaving a body and coming back to it.
+    /// What truly falls, slides or swings loses some.
     static bool isCalm(const Island& island);
 
   private:
@@ -64,7 +57,8 @@ class Sleepers {
         std::pmr::vector<btCollisionObject*> supports;
         bool ready;
     };
-    bool keepsPlace(ShellBody& shell, const Vec3& gravity, double h) const;
+    bool keepsPlace(ShellBody& shell, double h) const;
+    void followEnergy(ShellBody& shell, const Vec3& gravity, double h) const;
     void dropRestless(std::span<Candidate> candidates) const;
     bool isDisturbed(const ShellBody& shell, const Vec3& gravity) const;
     void wakeTouched(double h);

@@ -79,7 +79,7 @@ TEST_P(Drape, FallsAsleep) {
             Scene scene;
             scene.addBody(thingToDrape(GetParam()), 0.0, btVector3(btScalar(aside), btScalar(-0.32), 0));
             const ShellBody& cloth = scene.shells->add(sheetAt(1.0, 10, 0.0), material);
-            EXPECT_GT(timeToSleep(scene, cloth, 60.0), 1.0)
+            EXPECT_GT(timeToSleep(scene, cloth, 40.0), 1.0)
                 << material.areaDensity() << " kg/m2, " << aside << " m aside";
             EXPECT_GT(cloth.shell().positions().row(1).minCoeff(), -1.0);  // it has not slid off
         }
