@@ -13,10 +13,9 @@
 namespace jacket::bullet {
 namespace {
 
-constexpr double kAtRest = 0.01;  // of the mean edge: a vertex that moves no farther keeps its place
-constexpr double kSlowShell =
-    0.03;                       // of sqrt(g L), L: the side of the shell: as fast as what flickers may be, on average
-constexpr double kFall = 2e-4;  // of m g L: what falls by less keeps its energy
+constexpr double kAtRest = 0.01;     // of the mean edge: a vertex that moves no farther keeps its place
+constexpr double kSlowShell = 0.03;  // of sqrt(g L), L: the shell's side: no faster on average is what only flickers
+constexpr double kFall = 2e-4;       // of m g L: what loses less keeps its energy
 constexpr double kNearlyCalm = 0.9;  // of gDeactivationTime: as far as a body that touches an awake shell gets
 constexpr double kSlow = 0.01;       // a body slower than this wakes no shell that it comes near [m/s]
 
@@ -26,6 +25,7 @@ bool samePose(const btTransform& a, const btTransform& b) {
                btScalar(1e-12);
 }
 
+/// For how long a shell loses no energy before it counts as calm [s]; some, however little Bullet waits.
 double waitForCalm() {
     return std::max(double(gDeactivationTime), 1.5);
 }
@@ -163,7 +163,7 @@ void Sleepers::rest(const Vec3& gravity, double h) {
         if (std::exchange(rest.wakeAsked, false)) rest.place.resize(3, 0), rest.level = 0.0;
         if (rest.asleep) continue;
         candidates.push_back({shell.get(), supportsOf(*shell), keepsPlace(*shell, h)});
-        if (shell->options().sleeping) followEnergy(*shell, gravity, h);
+        followEnergy(candidates.back(), gravity, h);
         for (btCollisionObject* object : candidates.back().supports) keepAwake(*object, candidates.back().ready);
     }
     dropRestless(candidates);
@@ -196,15 +196,18 @@ bool Sleepers::keepsPlace(ShellBody& shell, double h) const {
     return rest.quiet >= double(gDeactivationTime) || rest.damped >= 2.0 * waitForCalm();
 }
 
-void Sleepers::followEnergy(ShellBody& body, const Vec3& gravity, double h) const {
-    ShellRest& rest = *body.m_rest;
-    const Shell& shell = body.shell();
+void Sleepers::followEnergy(const Candidate& candidate, const Vec3& gravity, double h) const {
+    ShellRest& rest = *candidate.shell->m_rest;
+    const Shell& shell = candidate.shell->shell();
     const bool isAsBefore = rest.gravity == gravity && rest.revision == shell.revision();
     rest.gravity = gravity;
     rest.revision = shell.revision();
     const double mass = shell.masses().sum(), weightTimesSide = mass * gravity.norm() * shell.side();
     const double kinetic = 0.5 * shell.masses().dot(shell.velocities().colwise().squaredNorm().transpose());
-    if (!isAsBefore || body.contacts().empty() || !(kinetic < 0.5 * kSlowShell * kSlowShell * weightTimesSide)) {
+    const bool mayCalmDown = candidate.shell->options().sleeping && !candidate.supports.empty() &&
+                             std::all_of(candidate.supports.begin(), candidate.supports.end(),
+                                         [](const btCollisionObject* object) { return standsStill(*object); });
+    if (!isAsBefore || !mayCalmDown || !(kinetic < 0.5 * kSlowShell * kSlowShell * weightTimesSide)) {
         rest.level = 0.0;
         return;
     }

@@ -58,7 +58,7 @@ class Sleepers {
         bool ready;
     };
     bool keepsPlace(ShellBody& shell, double h) const;
-    void followEnergy(ShellBody& shell, const Vec3& gravity, double h) const;
+    void followEnergy(const Candidate& candidate, const Vec3& gravity, double h) const;
     void dropRestless(std::span<Candidate> candidates) const;
     bool isDisturbed(const ShellBody& shell, const Vec3& gravity) const;
     void wakeTouched(double h);
