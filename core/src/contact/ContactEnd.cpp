@@ -222,7 +222,7 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
         double take = isBetweenBodies(touch) ? kAlteration * lacks : lacks;
         const double before = std::min(0.0, lacks - m_input.h * speed);
         if (m_onlyStops) take = lacks - before;
-        if (isBacked(contact, true)) take = lacks - before - m_input.h * speedOutOf(-before);
+        if (isBacked(contact)) take = lacks - before - m_input.h * speedOutOf(-before);
         touch.allowedGap += lacks - take;
         touch.target = speed - take / m_input.h;
     }

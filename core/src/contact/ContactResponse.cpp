@@ -162,8 +162,11 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     for (const Shell* shell : input.shells) m_startPoses.push_back(&shell->positions());
     m_still.assign(input.bodies.size(), Vec6::Zero());
     m_found.clear();
-    const double faceReach = mayBeBacked() ? reach : m_memory.empty() ? kNone : 10.0 * m_vertexSlop;
-    input.contacts->find({m_startPoses, m_still, 0.0}, reach, faceReach, m_found);
+    input.contacts->find({m_startPoses, m_still, 0.0}, reach, m_memory.empty() ? kNone : 10.0 * m_vertexSlop, m_found);
+    if (mayBeBacked()) {
+        m_found.clear();
+        input.contacts->find({m_startPoses, m_still, 0.0}, reach, reach, m_found);
+    }
     findBacked();
     dropPassed();
     findRoomBesideFaces();
@@ -256,15 +259,20 @@ void ContactResponse::findRoomBesideFaces() {
     }
 }
 
-/// Whether some vertex may be held, by a pin or another body, where a free body touches it.
+/// Whether some vertex may be held, by a pin or a wall, where a free body touches it: in a sheet that is pinned by its
+/// edge only those near the edge are, and the others need no faces.
 bool ContactResponse::mayBeBacked() const {
-    const bool isAnyHeld = std::any_of(m_held.begin(), m_held.end(), [](char held) { return held != 0; });
-    return hasFreeBodies() && (isAnyHeld || m_input.bodies.size() > 1);
+    if (!hasFreeBodies()) return false;
+    const bool areAllHeld = std::count(m_held.begin(), m_held.end(), 0) == 0;
+    const bool isAnyWall = std::count(m_dynamicIndex.begin(), m_dynamicIndex.end(), -1) > 0;
+    return areAllHeld || isAnyWall || std::any_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
+               return m_dynamicIndex[contact.body] >= 0 && m_held[globalVertex(contact, 0)] != 0;
+           });
 }
 
-/// Vertices that cannot give way to a free body, as something else holds them: a pin, or another body on the other
-/// side. There the body touches a surface that stays as it is, and its faces count from the start: found only when they
-/// are deep at the end, they would bear a body that rests by turns, and throw it.
+/// Vertices that cannot give way to a free body, as something else holds them: a pin, or a wall on the other side.
+/// There the body touches a surface that stays as it is, and its faces count from the start: found only when they are
+/// deep at the end, they would bear a body that rests by turns, and throw it.
 void ContactResponse::findBacked() {
     m_backed.clear();
     if (!mayBeBacked()) return;
@@ -275,24 +283,20 @@ void ContactResponse::findBacked() {
         if (m_dynamicIndex[contact.body] < 0) continue;
         for (int a = 0; a < 3; ++a) {
             const int vertex = globalVertex(contact, a);
-            bool isBacked = m_held[vertex] != 0, isByWall = isBacked;
             const auto [first, last] = near.equal_range(vertex);
-            for (auto other = first; other != last; ++other) {
-                if (other->second->body == contact.body || !isFacing(*other->second, contact)) continue;
-                isBacked = true;
-                isByWall = isByWall || m_dynamicIndex[other->second->body] < 0;
-            }
-            if (isBacked) m_backed.try_emplace({vertex, contact.body}, isByWall);
+            const auto isWallFacing = [&](const auto& other) {
+                return m_dynamicIndex[other.second->body] < 0 && isFacing(*other.second, contact);
+            };
+            if (m_held[vertex] || std::any_of(first, last, isWallFacing)) m_backed.emplace(vertex, contact.body);
         }
     }
 }
 
-bool ContactResponse::isBacked(const Contact& contact, bool byWalls) const {
+bool ContactResponse::isBacked(const Contact& contact) const {
     if (m_backed.empty()) return false;
     for (int a = 0; a < 3; ++a) {
         if (contact.weights[a] == 0.0) continue;
-        const auto known = m_backed.find({globalVertex(contact, a), contact.body});
-        if (known == m_backed.end() || (byWalls && !known->second)) return false;
+        if (m_backed.count({globalVertex(contact, a), contact.body}) == 0) return false;
     }
     return true;
 }
@@ -318,10 +322,9 @@ void ContactResponse::dropPassed() {
         const auto [first, last] = faces.equal_range({globalVertex(contact, int(corner)), contact.body});
         return std::any_of(first, last, [&](const auto& face) { return isBeside(contact, *face.second); });
     };
-    std::pmr::vector<Contact> kept(&m_pool);
-    for (const Contact& contact : m_found)
-        if (!isBacked(contact) || !isPassed(contact)) kept.push_back(contact);
-    m_found.assign(kept.begin(), kept.end());
+    std::pmr::vector<char> drops(&m_pool);
+    for (const Contact& contact : m_found) drops.push_back(isBacked(contact) && isPassed(contact));
+    std::erase_if(m_found, [&](const Contact& contact) { return drops[&contact - m_found.data()] != 0; });
 }
 
 /// Whether a face that has all vertices of a contact is nearer than this, another way.
@@ -404,7 +407,7 @@ double ContactResponse::timeOfTouch(const Touch& touch) const {
 
 void ContactResponse::alter(Touch& touch, Points& y) const {
     const Contact& c = touch.contact;
-    if (isBacked(c, true)) {
+    if (isBacked(c)) {
         touch.target = speedOutOf(-c.gap);
         touch.allowedGap = std::min(0.0, c.gap + m_input.h * touch.target);
         return;
