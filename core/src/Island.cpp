@@ -645,8 +645,10 @@ double IslandSolver::Impl::shareWithin(const IslandInput& input, const CoupledBo
 void IslandSolver::Impl::limitBodies(const IslandInput& input, StepReport& report) {
     const bool isSure = !unsettled && !report.limited;
     const std::vector<double>& speeds = response.speedsBeside(start, isSure ? v : start);
-    twistChange = u.w - freeTwist;
-    system.momentum(twistChange, momentum);
+    if (!isSure) {
+        twistChange = u.w - freeTwist;
+        system.momentum(twistChange, momentum);
+    }
     const BodyVectors& after = isSure ? u.w : supports.respond(momentum, input.h * input.gravity.norm());
     double least = 1.0;
     for (std::size_t b = 0; b < dynamicBodies.size(); ++b) {

@@ -202,22 +202,19 @@ void Sleepers::followEnergy(const Candidate& candidate, const Vec3& gravity, dou
     const bool isAsBefore = rest.gravity == gravity && rest.revision == shell.revision();
     rest.gravity = gravity;
     rest.revision = shell.revision();
-    const double mass = shell.masses().sum(), weightTimesSide = mass * gravity.norm() * shell.side();
-    const double kinetic = 0.5 * shell.masses().dot(shell.velocities().colwise().squaredNorm().transpose());
-    const bool mayCalmDown = candidate.shell->options().sleeping && !candidate.supports.empty() &&
-                             std::all_of(candidate.supports.begin(), candidate.supports.end(),
-                                         [](const btCollisionObject* object) { return standsStill(*object); });
-    if (!isAsBefore || !mayCalmDown || !(kinetic < 0.5 * kSlowShell * kSlowShell * weightTimesSide)) {
-        rest.level = 0.0;
+    const double waited = std::exchange(rest.level, 0.0);
+    if (!isAsBefore || !candidate.shell->options().sleeping || candidate.supports.empty() ||
+        !std::all_of(candidate.supports.begin(), candidate.supports.end(),
+                     [](const btCollisionObject* object) { return standsStill(*object); }))
         return;
-    }
+    const double weightTimesSide = shell.masses().sum() * gravity.norm() * shell.side();
+    const double kinetic = 0.5 * shell.masses().dot(shell.velocities().colwise().squaredNorm().transpose());
+    if (!(kinetic < 0.5 * kSlowShell * kSlowShell * weightTimesSide)) return;
     const double energy =
         kinetic + shell.elasticEnergy(shell.positions()) - gravity.dot(shell.positions() * shell.masses());
-    if (rest.level == 0.0 || energy < rest.lowest - kFall * weightTimesSide) {
-        rest.lowest = energy;
-        rest.level = 0.0;
-    }
-    rest.level += h;
+    const bool hasFallen = waited == 0.0 || energy < rest.lowest - kFall * weightTimesSide;
+    if (hasFallen) rest.lowest = energy;
+    rest.level = (hasFallen ? 0.0 : waited) + h;
 }
 
 bool Sleepers::isCalm(const Island& island) {

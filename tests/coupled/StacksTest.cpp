@@ -102,7 +102,6 @@ class LightBoxOnMetal : public ::testing::TestWithParam<std::tuple<double, doubl
   protected:
     /// Of where it goes, which is what counts: velocities hold what the boxes bear, too [m/s].
     static double fastest(double light, double heavy, unsigned seed) {
-        constexpr double kStep = 1.0 / 60;
         Scene<> scene;
         scene.addFloor();
         scene.addBox(btVector3(btScalar(0.25), btScalar(0.1), btScalar(0.25)), heavy, btVector3(0, btScalar(0.1), 0))

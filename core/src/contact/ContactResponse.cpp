@@ -162,12 +162,16 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     for (const Shell* shell : input.shells) m_startPoses.push_back(&shell->positions());
     m_still.assign(input.bodies.size(), Vec6::Zero());
     m_found.clear();
-    input.contacts->find({m_startPoses, m_still, 0.0}, reach, m_memory.empty() ? kNone : 10.0 * m_vertexSlop, m_found);
-    if (mayBeBacked()) {
+    m_backed.clear();
+    const bool isSurface = mayBeBacked();  // by walls, or by pins everywhere: known before anything is found
+    const double faceReach = isSurface ? reach : m_memory.empty() ? kNone : 10.0 * m_vertexSlop;
+    input.contacts->find({m_startPoses, m_still, 0.0}, reach, faceReach, m_found);
+    const bool isBesidePin = !isSurface && mayBeBacked();
+    if (isBesidePin) {
         m_found.clear();
         input.contacts->find({m_startPoses, m_still, 0.0}, reach, reach, m_found);
     }
-    findBacked();
+    if (isSurface || isBesidePin) findBacked();
     dropPassed();
     findRoomBesideFaces();
     findHeirs();
@@ -263,8 +267,8 @@ void ContactResponse::findRoomBesideFaces() {
 /// edge only those near the edge are, and the others need no faces.
 bool ContactResponse::mayBeBacked() const {
     if (!hasFreeBodies()) return false;
-    const bool areAllHeld = std::count(m_held.begin(), m_held.end(), 0) == 0;
-    const bool isAnyWall = std::count(m_dynamicIndex.begin(), m_dynamicIndex.end(), -1) > 0;
+    const bool areAllHeld = std::find(m_held.begin(), m_held.end(), 0) == m_held.end();
+    const bool isAnyWall = std::find(m_dynamicIndex.begin(), m_dynamicIndex.end(), -1) != m_dynamicIndex.end();
     return areAllHeld || isAnyWall || std::any_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
                return m_dynamicIndex[contact.body] >= 0 && m_held[globalVertex(contact, 0)] != 0;
            });
@@ -274,8 +278,6 @@ bool ContactResponse::mayBeBacked() const {
 /// There the body touches a surface that stays as it is, and its faces count from the start: found only when they are
 /// deep at the end, they would bear a body that rests by turns, and throw it.
 void ContactResponse::findBacked() {
-    m_backed.clear();
-    if (!mayBeBacked()) return;
     std::pmr::multimap<int, const Contact*> near(&m_pool);
     for (const Contact& contact : m_found)
         if (contact.isVertex() && contact.gap < 10.0 * m_vertexSlop) near.emplace(globalVertex(contact, 0), &contact);

@@ -262,7 +262,7 @@ class ContactResponse {
     bool m_onlyStops = false;  ///< see Numbering
     std::vector<Contact> m_found;
     std::pmr::map<int, double> m_room{&m_pool};            ///< of vertices: see findRoomBesideFaces [m]
-    std::pmr::set<std::pair<int, int>> m_backed{&m_pool};  ///< (vertex, free body): by what nothing moves
+    std::pmr::set<std::pair<int, int>> m_backed{&m_pool};  ///< (vertex, free body): see findBacked
     std::pmr::map<int, Vec3> m_raised{
         &m_pool};  ///< by what their own contacts take vertices out of bodies in this round [m]
     std::pmr::set<int> m_claimed{&m_pool};    ///< vertices of the soft rows that this round has added
