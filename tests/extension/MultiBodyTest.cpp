@@ -10,6 +10,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <functional>
+#include <set>
 #include <tuple>
 
 #include "ArticulatedBody.h"
@@ -274,14 +275,14 @@ TEST(MultiBody, LinearMomentumOfAFreeSystemIsKept) {
     auto& sheet = scene.shells->add(squareSheet(2.0, 20), trampolineCloth());
     Vec3 start = Vec3::Zero();
     before.read = [&] { start = momentumOf(tree) + sheet.shell().linearMomentum(); };
-    std::size_t mostContacts = 0;
+    std::set<const btCollisionObject*> touched;
     for (int i = 0; i < 60; ++i) {
         scene.step(1.0 / 120);
-        mostContacts = std::max(mostContacts, sheet.contacts().size());
+        for (const auto& contact : sheet.contacts()) touched.insert(contact.object);
         const Vec3 change = momentumOf(tree) + sheet.shell().linearMomentum() - start;
         ASSERT_LT(change.norm(), bulletTolerance(1e-9, 1e-5) * start.norm()) << "step " << i;
     }
-    EXPECT_GT(mostContacts, 2u);
+    EXPECT_GE(touched.size(), 2u);  // links
     EXPECT_GT(sheet.shell().linearMomentum().norm(), 0.1);
     scene.world.removeAction(&before);
 }

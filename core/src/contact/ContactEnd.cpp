@@ -129,15 +129,20 @@ bool ContactResponse::isAnyDeep() const {
 }
 
 /// The touch that a contact belongs to, -1: none. A point that has moved on to a neighbouring face is still the same.
+/// Where a body lies on a face with more than a point, as a box or a cylinder does on one larger than it, the solve
+/// takes out one end of it and the next one finds the other: these are two.
 int ContactResponse::touchOf(const Contact& contact) const {
-    if (const auto known = m_index.find(keyOf(contact)); known != m_index.end()) return known->second;
-    if (contact.isVertex()) return -1;
-    for (std::size_t i = 0; i < m_touches.size(); ++i) {
-        const Contact& other = m_touches[i].contact;
-        if (m_touches[i].isRow && !other.isVertex() && other.shell == contact.shell && other.body == contact.body &&
-            (other.point - contact.point).norm() < kSamePoint * m_edge[contact.shell])
-            return static_cast<int>(i);
-    }
+    const auto known = m_index.find(keyOf(contact));
+    if (contact.isVertex()) return known == m_index.end() ? -1 : known->second;
+    const auto isNear = [&](const Touch& touch) {
+        const Contact& other = touch.contact;
+        return !other.isVertex() && other.shell == contact.shell && other.body == contact.body &&
+               (other.point - contact.point).norm() < kSamePoint * m_edge[contact.shell];
+    };
+    const auto stays = [&](const Touch& touch) { return touch.active && touch.isPlaced && !isNear(touch); };
+    if (known != m_index.end() && !stays(m_touches[known->second])) return known->second;
+    for (std::size_t i = 0; i < m_touches.size(); ++i)
+        if (m_touches[i].isRow && isNear(m_touches[i])) return static_cast<int>(i);
     return -1;
 }
 
@@ -211,6 +216,7 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     const Vec3 firstNormal = touch.contact.normal;
     const double firstGap = touch.contact.gap;
     place(touch, contact);
+    touch.isPlaced = true;
     touch.missed = 0.0;
     if (touch.dynamicBody >= 0) touch.arm = armAtEnd(contact);
     if (turned) {
@@ -218,16 +224,25 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
         touch.contact.gap = firstGap;
         touch.target = -std::max(firstGap, 0.0) / m_input.h;
     } else {
-        const double speed = relativeVelocity(touch, solved).dot(contact.normal);
-        double take = isBetweenBodies(touch) ? kAlteration * lacks : lacks;
-        const double before = std::min(0.0, lacks - m_input.h * speed);
-        if (m_onlyStops) take = lacks - before;
-        if (isBacked(contact)) take = lacks - before - m_input.h * speedOutOf(-before);
-        touch.allowedGap += lacks - take;
-        touch.target = speed - take / m_input.h;
+        aim(touch, lacks, solved);
     }
     if (touch.bounces) touch.target = std::max(touch.target, leavingSpeed(touch));
     return true;
+}
+
+/// Sets what a contact where the end found it is to reach. `lacks`: see missing.
+void ContactResponse::aim(Touch& touch, double lacks, const IslandVelocities& solved) const {
+    const Contact& contact = touch.contact;
+    const double speed = relativeVelocity(touch, solved).dot(contact.normal);
+    const double before = lacks - m_input.h * speed;
+    double take = isBetweenBodies(touch) ? kAlteration * lacks : lacks;
+    if (m_onlyStops) take = lacks - std::min(0.0, before);
+    if (isBacked(contact)) {  // from where it really is: each end of a body that lies aslant has its own depth
+        const double start = before + touch.allowedGap;
+        take = lacks + touch.allowedGap - (start < 0.0 ? std::min(0.0, start + m_input.h * speedOutOf(-start)) : 0.0);
+    }
+    touch.allowedGap += lacks - take;
+    touch.target = speed - take / m_input.h;
 }
 
 /// What is lifted into a wall on the other side of the shell comes down again, and is not lifted any more.

@@ -105,6 +105,7 @@ class ContactResponse {
         int flips = 0;    ///< between sticking and sliding, in this step
         int changes = 0;  ///< how often it was activated or dropped
         bool active = false, sticks = false, isRow = false;
+        bool isPlaced = false;   ///< where the end of a solve found it
         bool isVain = false;     ///< its multiplier does not help: others hold it where it is
         bool isPinched = false;  ///< a soft row of vertices that another body holds
         bool bounces = false;    ///< its target is that of restitution
@@ -238,6 +239,7 @@ class ContactResponse {
     bool isNearOthers(int vertex, int body) const;
     bool isSaidByVertex(const Contact& contact) const;
     bool closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round);
+    void aim(Touch& touch, double lacks, const IslandVelocities& solved) const;
     bool entersThere(const Contact& contact, const Touch& touch, const IslandVelocities& solved) const;
     void putDown(const Contact& contact);
     bool liftVertices(const Contact& contact, double by, const IslandVelocities& solved);
