@@ -20,7 +20,7 @@ EnergyBalance energyOf(const World& world, const std::vector<BodyState>& bodies)
     for (int k = 0; k < world.shellCount(); ++k) {
         const Shell& shell = world.shell(k);
         const ShellEnergy energy = shell.energy();
-        sum.kinetic += 0.5 * world.velocities(k).colwise().squaredNorm().dot(shell.masses());
+        sum.kinetic += shell.kineticEnergy(world.velocities(k));
         sum.membrane += energy.membrane;
         sum.bending += energy.bending;
         sum.plasticWork += energy.plasticWork;

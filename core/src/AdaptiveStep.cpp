@@ -19,9 +19,9 @@ double largestStrain(const Shell& shell, const Points& from, const Points& to) {
     return most;
 }
 
-/// Kinetic and elastic [J].
-double ownEnergy(const Shell& shell, const Points& x, const Points& v) {
-    return shell.elasticEnergy(x) + 0.5 * (v.colwise().squaredNorm() * shell.masses()).value();
+/// Kinetic, and elastic at positions `x` [J].
+double ownEnergy(const Shell& shell, const Points& x) {
+    return shell.elasticEnergy(x) + shell.kineticEnergy();
 }
 
 /// What gravity and forces do on the way from one shape to another [J].
@@ -48,11 +48,11 @@ AdaptiveReport Shell::stepAdaptively(double duration, const Vec3& gravity, Adapt
         // what is left in equal parts, so that no splinter of a step remains
         const double h = left / std::ceil(left / std::min(control.next, left) - 1e-9);
         const Points v = m_v, lastX = m_lastX, lastV = m_lastV;
-        const double lastH = m_lastH, before = ownEnergy(*this, m_x, m_v);
+        const double lastH = m_lastH, before = ownEnergy(*this, m_x);
         IslandInput input{.h = h, .gravity = gravity, .wind = wind, .shells = {&self, 1}};
         const StepReport step = m_ownSolver->solve(input);
         const Points end = m_x + (m_stride * h) * m_v + m_y;
-        const auto gain = [&] { return ownEnergy(*this, end, m_v) - before - workOfLoads(*this, m_x, end, gravity); };
+        const auto gain = [&] { return ownEnergy(*this, end) - before - workOfLoads(*this, m_x, end, gravity); };
         const bool acceptable = step.finite && largestStrain(*this, m_x, end) <= control.mostStrain &&
                                 (wind || gain() <= control.mostEnergyGain * std::max(before, 1e-300));
         if (!acceptable && h > control.shortest) {

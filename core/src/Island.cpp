@@ -681,10 +681,9 @@ bool IslandSolver::Impl::bodiesLead(const IslandInput& input) const {
 
 /// Of a shell at the start of the step, or what gravity would give it in one [J].
 double IslandSolver::Impl::energyOfMotion(const IslandInput& input, std::size_t k) const {
-    const Eigen::VectorXd& masses = input.shells[k]->masses();
-    const auto before = from().middleCols(offsets[k], input.shells[k]->vertexCount());
-    return 0.5 * masses.dot(before.colwise().squaredNorm().transpose()) +
-           0.5 * masses.sum() * (stepOf[k] * input.gravity).squaredNorm();
+    const Shell& shell = *input.shells[k];
+    return shell.kineticEnergy(from().middleCols(offsets[k], shell.vertexCount())) +
+           0.5 * shell.masses().sum() * (stepOf[k] * input.gravity).squaredNorm();
 }
 
 /// What shells and bodies gain in the solved step besides what gravity, forces and moved supports do, over the energy
@@ -948,8 +947,7 @@ bool IslandSolver::Impl::pushesStrain(const IslandInput& input) {
     double moving = 0.0, stretching = 0.0;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
-        const auto part = v.middleCols(offsets[k], shell.vertexCount());
-        moving += 0.5 * shell.masses().dot(part.colwise().squaredNorm().transpose());
+        moving += shell.kineticEnergy(v.middleCols(offsets[k], shell.vertexCount()));
         moving += 0.5 * shell.masses().sum() * (stepOf[k] * input.gravity).squaredNorm();
         const auto end = pushes.lower_bound(offsets[k] + shell.vertexCount());
         for (auto one = pushes.lower_bound(offsets[k]); one != end; ++one)

@@ -11,10 +11,14 @@
 namespace jacket {
 namespace {
 
-void requireSize(const Points& points, int count, const char* what) {
-    if (points.cols() != count)
+void requireColumns(Eigen::Index columns, int count, const char* what) {
+    if (columns != count)
         throw std::invalid_argument(std::string(what) + " must have " + std::to_string(count) + " columns, got " +
-                                    std::to_string(points.cols()));
+                                    std::to_string(columns));
+}
+
+void requireSize(const Points& points, int count, const char* what) {
+    requireColumns(points.cols(), count, what);
     for (int i = 0; i < count; ++i)
         if (!points.col(i).allFinite())
             throw std::invalid_argument(std::string(what) + " must be finite, vertex " + std::to_string(i) + " is not");
@@ -197,11 +201,20 @@ void Shell::setPressure(double pressure) {
 
 ShellEnergy Shell::energy() const {
     ShellEnergy e;
-    for (int i = 0; i < vertexCount(); ++i) e.kinetic += 0.5 * m_mass[i] * m_v.col(i).squaredNorm();
+    e.kinetic = kineticEnergy();
     e.membrane = m_assembly->membrane().value(m_x);
     e.bending = m_assembly->bending().value(m_x);
     e.plasticWork = m_plasticWork;
     return e;
+}
+
+double Shell::kineticEnergy() const {
+    return kineticEnergy(m_v);
+}
+
+double Shell::kineticEnergy(const Eigen::Ref<const Points>& v) const {
+    requireColumns(v.cols(), vertexCount(), "Shell::kineticEnergy: velocities");
+    return 0.5 * m_mass.dot(v.colwise().squaredNorm().transpose());
 }
 
 Vec3 Shell::linearMomentum() const {

@@ -117,8 +117,7 @@ void CarriedVertices::bringAlong(ShellBody& body, const Vec3& gravity, double h)
 
 /// Or what gravity would give it in a step, if it rests [J].
 double CarriedVertices::energyOfMotion(const Shell& shell, const Vec3& gravity, double h) {
-    return 0.5 * shell.masses().dot(shell.velocities().colwise().squaredNorm().transpose()) +
-           0.5 * shell.masses().sum() * (h * gravity).squaredNorm();
+    return shell.kineticEnergy() + 0.5 * shell.masses().sum() * (h * gravity).squaredNorm();
 }
 
 /// Where bodies have done something else by far, what touches them would strain the shell by it, by any amount. It goes

@@ -227,12 +227,9 @@ Vec3 ShellBody::momentum() const {
 
 /// Without the gravity that velocities hold ahead of time, as momentum().
 double ShellBody::kinetic() const {
-    double sum = 0.0;
-    for (int i = 0; i < vertexCount(); ++i) {
-        const Vec3 velocity = m_shell.velocities().col(i) - m_shell.freedom(i) * m_pendingGravity;
-        sum += 0.5 * m_shell.masses()[i] * velocity.squaredNorm();
-    }
-    return sum;
+    Points velocities = m_shell.velocities();
+    for (int i = 0; i < vertexCount(); ++i) velocities.col(i) -= m_shell.freedom(i) * m_pendingGravity;
+    return m_shell.kineticEnergy(velocities);
 }
 
 }  // namespace jacket::bullet

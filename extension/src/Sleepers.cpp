@@ -208,7 +208,7 @@ void Sleepers::followEnergy(const Candidate& candidate, const Vec3& gravity, dou
                      [](const btCollisionObject* object) { return standsStill(*object); }))
         return;
     const double weightTimesSide = shell.masses().sum() * gravity.norm() * shell.side();
-    const double kinetic = 0.5 * shell.masses().dot(shell.velocities().colwise().squaredNorm().transpose());
+    const double kinetic = shell.kineticEnergy();
     if (!(kinetic < 0.5 * kSlowShell * kSlowShell * weightTimesSide)) return;
     const double energy =
         kinetic + shell.elasticEnergy(shell.positions()) - gravity.dot(shell.positions() * shell.masses());

@@ -477,6 +477,24 @@ TEST(ShellEnergyTest, ForcesAreMinusItsGradient) {
     EXPECT_LT(forces.rowwise().sum().norm(), 1e-11 * forces.norm());
 }
 
+TEST(ShellEnergyTest, KineticEnergyIsHalfTheMassTimesSpeedSquared) {
+    Shell shell(square(3), softSheet());
+    const int n = shell.vertexCount();
+    Points ofTwo = Points::Zero(3, 2 * n);  // as of an island: this shell's velocities are the last n
+    ofTwo.col(0) = Vec3(7, 7, 7);
+    ofTwo.col(n + 5) = Vec3(1, -2, 2);
+    const double expected = 0.5 * shell.masses()[5] * 9.0;
+    EXPECT_DOUBLE_EQ(shell.kineticEnergy(ofTwo.rightCols(n)), expected);
+    EXPECT_EQ(shell.kineticEnergy(), 0.0);  // nothing of it has been set
+    shell.setVelocities(ofTwo.rightCols(n));
+    EXPECT_DOUBLE_EQ(shell.kineticEnergy(), expected);
+    EXPECT_EQ(shell.energy().kinetic, shell.kineticEnergy());
+    shell.setVelocities(Vec3(0, 3, 4).replicate(1, n));
+    EXPECT_NEAR(shell.kineticEnergy(), 0.5 * shell.masses().sum() * 25.0, 1e-14);
+    expectMentions(messageOf<std::invalid_argument>([&] { shell.kineticEnergy(ofTwo); }),
+                   {"Shell::kineticEnergy", std::to_string(n), std::to_string(2 * n)});
+}
+
 TEST(ShellEnergyTest, MomentaAndStretch) {
     Shell shell(square(3), softSheet());
     const Vec3 spin(1, 2, 3), speed(4, 5, 6), about(0.1, 0.2, 0.3);

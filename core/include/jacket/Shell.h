@@ -154,6 +154,9 @@ class Shell {
     unsigned revision() const { return m_revision; }
 
     ShellEnergy energy() const;
+    double kineticEnergy() const;  ///< sum of 1/2 m v^2 over the vertices [J]
+    /// The same with other velocities than the present ones.
+    double kineticEnergy(const Eigen::Ref<const Points>& v) const;
     Vec3 linearMomentum() const;                    ///< [N s]
     Vec3 angularMomentum(const Vec3& about) const;  ///< [N m s]
     double maxStretch() const;                      ///< largest edge length / rest length - 1 [-]
