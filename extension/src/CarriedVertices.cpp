@@ -37,6 +37,7 @@ void CarriedVertices::addTouching(ShellBody& shell, int vertex, const Obstacle& 
 
 void CarriedVertices::addTied(ShellBody& shell, int vertex, const Obstacle& obstacle, const Frame& end,
                               const Vec3& point) {
+    shell.m_ahead.resize(3, shell.m_shell.vertexCount());
     m_vertices.push_back({&shell, vertex, obstacle.object, obstacle.object->getBroadphaseHandle()->getUid(), end,
                           obstacle.start.inverse(Eigen::Isometry) * point, Vec3::Zero()});
 }
@@ -70,27 +71,29 @@ void CarriedVertices::findShifts(const ShellBody& shell, const btCollisionWorld&
 }
 
 /// Where a body was stopped, or struck, a vertex that alone followed it would tear at the shell. If that is more than
-/// its energy allows for, all of the shell follows, by its inertia and its stiffness, as in a step from standing still
-/// in which what is tied is led to its anchor. Velocities stay as they are. What even that would strain by more than
-/// its energy is left to the next solve.
+/// its energy allows for, all of the shell follows. What even that would strain by more than its energy is left to the
+/// next solve.
 void CarriedVertices::bringAlong(ShellBody& body, const Vec3& gravity, double h) {
     constexpr double kLittle = 0.01;  // of the energy of motion
     Shell& shell = body.m_shell;
-    double stretching = 0.0;
-    body.m_ahead = shell.positions();
-    for (const auto& [carried, by] : m_shifts) {
-        if (!carried->anchor) continue;
-        stretching += strainOf(shell, by);
-        body.m_ahead.col(carried->vertex) += by;
-    }
     const double moving = energyOfMotion(shell, gravity, h);
-    if (stretching <= kLittle * moving) return;
+    if (strainAlone(shell, true) <= kLittle * moving) return;
     const double before = shell.elasticEnergy(shell.positions());
-    if (shell.elasticEnergy(body.m_ahead) <= before + kLittle * moving) return;
+    if (energyAfter(body, 0.0) <= before + kLittle * moving) return;
+    const std::optional<Points> way = wayOfAll(shell, gravity, h);
+    if (way && energyAlong(body, *way) <= before + moving)
+        follow(shell, *way);
+    else
+        std::erase_if(m_shifts, [](const Shift& shift) { return shift.carried->isTied(); });
+}
+
+/// How all of a shell follows what is tied to a body, by its inertia and its stiffness: as in a step from standing
+/// still in which that is led to its anchor. Velocities stay as they are. None if the solve came to nothing.
+std::optional<Points> CarriedVertices::wayOfAll(Shell& shell, const Vec3& gravity, double h) const {
     std::vector<CoupledBody> leaders;
     std::vector<Anchor> led;
     for (const auto& [carried, by] : m_shifts) {
-        if (!carried->anchor) continue;
+        if (!carried->isTied()) continue;
         led.push_back({0, carried->vertex, static_cast<int>(leaders.size()), shell.positions().col(carried->vertex)});
         CoupledBody& leader = leaders.emplace_back();
         leader.prescribed = true;
@@ -99,20 +102,36 @@ void CarriedVertices::bringAlong(ShellBody& body, const Vec3& gravity, double h)
     const Points velocities = shell.velocities();
     shell.setVelocities(Points::Zero(3, shell.vertexCount()));
     Shell* const one = &shell;
-    IslandSolver solver;
-    const IslandInput input{.h = h, .gravity = gravity, .shells = {&one, 1}, .bodies = leaders, .anchors = led};
-    const bool isFinite = solver.solve(input).finite;
-    body.m_ahead = shell.positions() + h * shell.velocities();
-    for (auto& [carried, by] : m_shifts) {
-        if (!carried->anchor) continue;
-        body.m_ahead.col(carried->vertex) = shell.positions().col(carried->vertex) + by;
-        by -= h * shell.velocities().col(carried->vertex);  // what the solve has left over
-    }
-    if (isFinite && shell.elasticEnergy(body.m_ahead) <= before + moving)
-        for (int i = 0; i < shell.vertexCount(); ++i) shell.displace(i, h * shell.velocities().col(i));
-    else
-        std::erase_if(m_shifts, [](const Shift& shift) { return shift.carried->anchor.has_value(); });
+    IslandSolver solver;  // a new one: what others have solved is no start for this
+    const bool isFinite =
+        solver.solve({.h = h, .gravity = gravity, .shells = {&one, 1}, .bodies = leaders, .anchors = led}).finite;
+    const Points way = h * shell.velocities();
     shell.setVelocities(velocities);
+    return isFinite ? std::optional(way) : std::nullopt;
+}
+
+/// Elastic, when all vertices have gone a way, and what is tied all of its own [J].
+double CarriedVertices::energyAlong(ShellBody& body, const Points& way) const {
+    const Points& x = body.m_shell.positions();
+    body.m_ahead = x + way;
+    for (const auto& [carried, by] : m_shifts)
+        if (carried->isTied()) body.m_ahead.col(carried->vertex) = x.col(carried->vertex) + by;
+    return body.m_shell.elasticEnergy(body.m_ahead);
+}
+
+/// All vertices go a way. What is tied has the rest of its own to go.
+void CarriedVertices::follow(Shell& shell, const Points& way) {
+    for (int i = 0; i < shell.vertexCount(); ++i) shell.displace(i, way.col(i));
+    for (auto& [carried, by] : m_shifts)
+        if (carried->isTied()) by -= way.col(carried->vertex);
+}
+
+/// Of vertices that moved alone, each about what strainOf says: of those that are tied, or of those that touch [J].
+double CarriedVertices::strainAlone(const Shell& shell, bool ofTied) const {
+    double sum = 0.0;
+    for (const auto& [carried, by] : m_shifts)
+        if (carried->isTied() == ofTied) sum += strainOf(shell, by);
+    return sum;
 }
 
 /// Or what gravity would give it in a step, if it rests [J].
@@ -126,28 +145,26 @@ double CarriedVertices::energyOfMotion(const Shell& shell, const Vec3& gravity, 
 void CarriedVertices::spare(ShellBody& body, const Vec3& gravity, double h) {
     constexpr int kMostHalvings = 6;
     const Shell& shell = body.m_shell;
-    double stretching = 0.0;
-    for (const auto& [carried, by] : m_shifts)
-        if (!carried->anchor) stretching += strainOf(shell, by);
+    const double stretching = strainAlone(shell, false);
     if (stretching == 0.0) return;
     const double moving = energyOfMotion(shell, gravity, h);
     if (stretching <= moving) return;
     const double before = energyAfter(body, 0.0), most = moving + 2.0 * before;
     if (energyAfter(body, 1.0) <= most) return;
     for (auto& [carried, by] : m_shifts)
-        if (!carried->anchor) by = carried->normal.dot(by) * carried->normal;
+        if (!carried->isTied()) by = carried->normal.dot(by) * carried->normal;
     double share = 1.0;
     for (int halving = 0; halving < kMostHalvings && energyAfter(body, share) > most; ++halving) share *= 0.5;
     if (energyAfter(body, share) > most) share = 0.0;
     for (auto& [carried, by] : m_shifts)
-        if (!carried->anchor) by *= share;
+        if (!carried->isTied()) by *= share;
 }
 
 /// Elastic, when what is tied has gone all of its way and what touches a share of it [J].
 double CarriedVertices::energyAfter(ShellBody& body, double share) const {
     body.m_ahead = body.m_shell.positions();
     for (const auto& [carried, by] : m_shifts)
-        body.m_ahead.col(carried->vertex) += (carried->anchor ? 1.0 : share) * by;
+        body.m_ahead.col(carried->vertex) += (carried->isTied() ? 1.0 : share) * by;
     return body.m_shell.elasticEnergy(body.m_ahead);
 }
 
@@ -178,7 +195,7 @@ void CarriedVertices::moveAsOne(ShellBody& body, std::vector<Shift>& shifts) {
         const Vec3 arm = x.col(i) - centre;
         return motion.head<3>() + turn * arm - arm;
     };
-    std::erase_if(shifts, [](const Shift& shift) { return !shift.carried->anchor; });
+    std::erase_if(shifts, [](const Shift& shift) { return !shift.carried->isTied(); });
     for (auto& [carried, by] : shifts) by -= way(carried->vertex);
     for (int i = 0; i < shell.vertexCount() && shell.pinCount() == 0; ++i) shell.displace(i, way(i));
 }

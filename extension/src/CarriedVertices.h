@@ -28,6 +28,7 @@ class CarriedVertices {
         Frame end;                   ///< where the body was solved to go
         std::optional<Vec3> anchor;  ///< in the body's frame; none: it touches the body
         Vec3 normal;                 ///< of what touches
+        bool isTied() const { return anchor.has_value(); }
     };
     /// Where a vertex is to be moved.
     struct Shift {
@@ -38,6 +39,10 @@ class CarriedVertices {
     static double energyOfMotion(const Shell& shell, const Vec3& gravity, double h);
     static void moveAsOne(ShellBody& shell, std::vector<Shift>& shifts);
     void bringAlong(ShellBody& shell, const Vec3& gravity, double h);
+    std::optional<Points> wayOfAll(Shell& shell, const Vec3& gravity, double h) const;
+    double energyAlong(ShellBody& shell, const Points& way) const;
+    void follow(Shell& shell, const Points& way);
+    double strainAlone(const Shell& shell, bool ofTied) const;
     void spare(ShellBody& shell, const Vec3& gravity, double h);
     double energyAfter(ShellBody& shell, double share) const;
 
