@@ -16,7 +16,7 @@ namespace {
 constexpr double kAtRest = 0.01;     // of the mean edge: a vertex that moves no farther keeps its place
 constexpr double kSlowShell = 0.03;  // of sqrt(g L), L: the shell's side: no faster on average is what only flickers
 constexpr double kFall = 2e-4;       // of m g L: what loses less keeps its energy
-constexpr double kNearlyCalm = 0.9;  // of gDeactivationTime: as far as a body that touches an awake shell gets
+constexpr double kMostWait = 0.9;    // of gDeactivationTime: as far as a body that touches an awake shell gets
 constexpr double kSlow = 0.01;       // a body slower than this wakes no shell that it comes near [m/s]
 
 bool samePose(const btTransform& a, const btTransform& b) {
@@ -37,9 +37,9 @@ bool sleeps(const btCollisionObject& object) {
 }
 
 /// Whether Bullet would let it sleep by now. Multibodies do not say; they must be the first.
-bool isCalm(const btCollisionObject& object) {
+bool mayFallAsleep(const btCollisionObject& object) {
     if (btMultiBodyLinkCollider::upcast(&object)) return sleeps(object);
-    return sleeps(object) || object.getDeactivationTime() >= btScalar(kNearlyCalm) * gDeactivationTime;
+    return sleeps(object) || object.getDeactivationTime() >= btScalar(kMostWait) * gDeactivationTime;
 }
 
 /// Left alone, Bullet would put it to sleep: it knows of no contact with the shell.
@@ -50,7 +50,7 @@ void keepAwake(btCollisionObject& object, bool isShellQuiet) {
     }
     if (sleeps(object) || object.getActivationState() == DISABLE_DEACTIVATION) return;
     if (object.getActivationState() == WANTS_DEACTIVATION) object.setActivationState(ACTIVE_TAG);
-    object.setDeactivationTime(std::min(object.getDeactivationTime(), btScalar(kNearlyCalm) * gDeactivationTime));
+    object.setDeactivationTime(std::min(object.getDeactivationTime(), btScalar(kMostWait) * gDeactivationTime));
 }
 
 void fallAsleep(btCollisionObject& object) {
@@ -237,8 +237,7 @@ void Sleepers::dropRestless(std::span<Candidate> candidates) const {
             if (!c.ready) awake.insert(awake.end(), c.supports.begin(), c.supports.end());
         for (Candidate& c : candidates) {
             const bool restless = std::any_of(c.supports.begin(), c.supports.end(), [&](const btCollisionObject* o) {
-                return !jacket::bullet::isCalm(*o) ||
-                       (!sleeps(*o) && std::find(awake.begin(), awake.end(), o) != awake.end());
+                return !mayFallAsleep(*o) || (!sleeps(*o) && std::find(awake.begin(), awake.end(), o) != awake.end());
             });
             if (!c.ready || !restless) continue;
             c.ready = false;
