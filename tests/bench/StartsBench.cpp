@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "support/HardScenes.h"
-#include "support/RandomWorld.h"
+#include "support/Random.h"
 #include "support/Target.h"
 
 namespace jacket::bullet::testing {
@@ -85,11 +85,11 @@ void missiles(const std::string& shape, double speed, int starts) {
     const auto cube = boxMesh(kHalf);
     int stopped = 0, silent = 0;
     double most = 0.0;
-    Draw draw(7);
+    Random random(7);
     for (int i = 0; i < starts; ++i) {
         Target scene;
-        const double x = draw.between(-0.1, 0.1), z = draw.between(-0.1, 0.1), y = draw.between(0.11, 0.91);
-        auto& body = scene.addBody(missile(shape, *cube), std::pow(10.0, draw.between(-1.5, 0.0)),
+        const double x = random.between(-0.1, 0.1), z = random.between(-0.1, 0.1), y = random.between(0.11, 0.91);
+        auto& body = scene.addBody(missile(shape, *cube), std::pow(10.0, random.between(-1.5, 0.0)),
                                    btVector3(btScalar(x), btScalar(y), btScalar(z)));
         body.setLinearVelocity(btVector3(0, btScalar(-speed), 0));
         const double start = jacket::testing::energy(scene).total();
@@ -109,10 +109,10 @@ void missiles(const std::string& shape, double speed, int starts) {
 /// Sheets of 1 m that come down at 4.6 to 10 m/s, from 10 to 60 cm, over a board of 40 x 30 cm in steps of 1/60 s.
 void shelf(double thick, int starts) {
     int held = 0, silent = 0, unsettled = 0, solves = 0;
-    Draw draw(11);
+    Random random(11);
     for (int i = 0; i < starts; ++i) {
-        const Vec3 from(draw.between(-0.05, 0.05), draw.between(0.1, 0.6), draw.between(-0.05, 0.05));
-        const double speed = draw.between(4.6, 10.0);
+        const Vec3 from(random.between(-0.05, 0.05), random.between(0.1, 0.6), random.between(-0.05, 0.05));
+        const double speed = random.between(4.6, 10.0);
         Shelf scene(thick, from, speed);
         for (int k = 0; k < int(60.0 * (from.y() / speed + 0.7)); ++k) {
             scene.step(kStep);

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "support/HardScenes.h"
-#include "support/RandomWorld.h"
+#include "support/Random.h"
 
 namespace jacket::bullet::testing {
 namespace {
@@ -125,12 +125,12 @@ class LightBoxOnMetal : public ::testing::TestWithParam<std::tuple<double, doubl
         constexpr double kSide = 0.4;
         constexpr int kCells = 7;
         TriangleMesh mesh = squareSheet(kSide, kCells);
-        Draw draw(seed);
+        Random random(seed);
         const double most = 0.3 * kSide / kCells;
         for (int i = 0; i < mesh.positions.cols(); ++i)
             for (const int axis : {0, 2})
                 if (std::abs(mesh.positions(axis, i)) < 0.49 * kSide)
-                    mesh.positions(axis, i) += draw.between(-most, most);
+                    mesh.positions(axis, i) += random.between(-most, most);
         mesh.positions.row(1).array() += height;
         return mesh;
     }

@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "ClosedForms.h"
+#include "Convert.h"
 #include "support/Random.h"
 
 namespace jacket::bullet {

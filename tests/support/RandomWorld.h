@@ -5,43 +5,22 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "support/BulletScene.h"
+#include "support/Random.h"
 
 namespace jacket::bullet::testing {
-
-/// Numbers by chance that are the same on every machine.
-class Draw {
-  public:
-    explicit Draw(unsigned seed) : m_engine(seed) {}
-    double between(double low, double high) { return low + (high - low) * (m_engine() / 4294967296.0); }
-    double logBetween(double low, double high) { return std::exp(between(std::log(low), std::log(high))); }
-    int below(int count) { return static_cast<int>(between(0, count)); }
-    template <class T, std::size_t N>
-    const T& of(const T (&choices)[N]) {
-        return choices[below(int(N))];
-    }
-    btVector3 vector(const Vec3& low, const Vec3& high) {  // one after the other, as arguments would not be
-        btVector3 drawn(0, 0, 0);
-        for (int k = 0; k < 3; ++k) drawn[k] = btScalar(between(low[k], high[k]));
-        return drawn;
-    }
-
-  private:
-    std::mt19937 m_engine;
-};
 
 /// A sheet over a floor, and one to four bodies that fall onto it or stand below it: a game's, and some that no game
 /// has. Masses are 0.01 to 100 times the sheet's, speeds up to 12 m/s, steps 1/60 to 1/240 s.
 class RandomWorld {
   public:
-    explicit RandomWorld(unsigned seed) : m_draw(seed) {
+    explicit RandomWorld(unsigned seed) : m_random(seed) {
         m_scene.addFloor();
         addSheet();
-        const int count = 1 + m_draw.below(4);
+        const int count = 1 + m_random.below(4);
         for (int i = 0; i < count; ++i) addBody(i);
     }
     BulletScene& scene() { return m_scene; }
@@ -64,16 +43,16 @@ class RandomWorld {
             {"paper", materials::paper(), 0.5},         {"cardboard", materials::cardboard(), 1.0},
             {"rubber", materials::rubber(), 1.0},       {"aluminium 1 mm", materials::aluminium(1e-3), 1.0},
             {"steel 2 mm", materials::steel(2e-3), 1.0}};
-        const Cut& cut = m_draw.of(cuts);
-        m_side = m_draw.logBetween(0.15, 1.0) * cut.largest;
-        const int cells = int(m_draw.logBetween(3, 25));
-        m_height = m_draw.between(0.3, 1.2);
-        m_step = 1.0 / m_draw.of({60, 60, 120, 240});
+        const Cut& cut = m_random.of(cuts);
+        m_side = m_random.logBetween(0.15, 1.0) * cut.largest;
+        const int cells = int(m_random.logBetween(3, 25));
+        m_height = m_random.between(0.3, 1.2);
+        m_step = 1.0 / m_random.of({60, 60, 120, 240});
         TriangleMesh mesh = squareSheet(m_side, cells);
         mesh.positions.row(1).array() += m_height;
-        m_sheet = &m_scene.shells->add(mesh, cut.material, {.friction = m_draw.between(0.0, 1.0)});
+        m_sheet = &m_scene.shells->add(mesh, cut.material, {.friction = m_random.between(0.0, 1.0)});
         static const char* const holds[] = {"free", "two corners", "one edge", "border", "four corners"};
-        const int hold = m_draw.below(5);
+        const int hold = m_random.below(5);
         pin(hold, cells);
         tell("%s %.2f m, %d cells, %s, 1/%.0f s:", cut.name, m_side, cells, holds[hold], 1.0 / m_step);
     }
@@ -89,20 +68,20 @@ class RandomWorld {
     }
 
     void addBody(int index) {
-        const double size = std::min(m_side, 0.6) * m_draw.logBetween(0.05, 0.4);
+        const double size = std::min(m_side, 0.6) * m_random.logBetween(0.05, 0.4);
         auto shape = drawShape(size);
-        const bool isBelow = m_draw.below(4) == 0, isHeld = isBelow && m_draw.below(2) == 0;
-        const double mass = isHeld ? 0.0 : m_sheet->shell().masses().sum() * m_draw.logBetween(1e-2, 1e2);
+        const bool isBelow = m_random.below(4) == 0, isHeld = isBelow && m_random.below(2) == 0;
+        const double mass = isHeld ? 0.0 : m_sheet->shell().masses().sum() * m_random.logBetween(1e-2, 1e2);
         const double y =
             isBelow ? 1.5 * size + 1e-3 : m_height + 1.7 * size + 0.02 + 0.9 * index * std::min(m_side, 0.6);
         if (isBelow && y + 1.6 * size > m_height) return;
         const double aside = 0.4 * m_side;
-        auto& body = m_scene.addBody(std::move(shape), mass, m_draw.vector({-aside, y, -aside}, {aside, y, aside}));
+        auto& body = m_scene.addBody(std::move(shape), mass, m_random.vector({-aside, y, -aside}, {aside, y, aside}));
         if (!isBelow) {
-            const double speed = m_draw.logBetween(0.1, 12.0);
+            const double speed = m_random.logBetween(0.1, 12.0);
             body.setLinearVelocity(
-                m_draw.vector({-0.3 * speed, -speed, -0.3 * speed}, {0.3 * speed, -speed, 0.3 * speed}));
-            body.setAngularVelocity(m_draw.vector({-3, -3, 0}, {3, 3, 0}));
+                m_random.vector({-0.3 * speed, -speed, -0.3 * speed}, {0.3 * speed, -speed, 0.3 * speed}));
+            body.setAngularVelocity(m_random.vector({-3, -3, 0}, {3, 3, 0}));
         }
         tell(" %.2g m %.2g kg %.2g m/s%s,", size, mass, double(body.getLinearVelocity().length()),
              isBelow ? " below" : "");
@@ -111,12 +90,12 @@ class RandomWorld {
 
     std::unique_ptr<btCollisionShape> drawShape(double size) {
         static const char* const names[] = {"ball", "box", "capsule", "cylinder", "dumbbell"};
-        const int kind = m_draw.below(5);
+        const int kind = m_random.below(5);
         tell(" %s", names[kind]);
         const btScalar s = btScalar(size), slim = btScalar(0.7 * size);
         if (kind == 0) return std::make_unique<btSphereShape>(s);
         if (kind == 1)
-            return std::make_unique<btBoxShape>(m_draw.vector({size, 0.3 * size, 0.3 * size}, {size, size, size}));
+            return std::make_unique<btBoxShape>(m_random.vector({size, 0.3 * size, 0.3 * size}, {size, size, size}));
         if (kind == 2) return std::make_unique<btCapsuleShape>(btScalar(0.5 * size), s);
         if (kind == 3) return std::make_unique<btCylinderShape>(btVector3(slim, s, slim));
         m_parts.push_back(std::make_unique<btSphereShape>(btScalar(0.4 * size)));
@@ -134,7 +113,7 @@ class RandomWorld {
         m_what += text;
     }
 
-    Draw m_draw;
+    Random m_random;
     std::vector<std::unique_ptr<btCollisionShape>> m_parts;  ///< of compounds, which do not own them
     BulletScene m_scene;
     ShellBody* m_sheet = nullptr;
