@@ -1,0 +1,126 @@
+#include <memory_resource>
+#include <span>
+#include <vector>
+
+#include "IslandImpl.h"
+
+/// What contacts, bodies and shells are told that they exchanged, so that it adds up.
+namespace jacket {
+namespace {
+
+/// From a body's centre of mass to where the shell touches it, at the start of the step.
+Vec3 contactArm(const IslandInput& input, const Contact& contact) {
+    Vec3 arm = -input.bodies[contact.body].position;
+    for (int a = 0; a < 3; ++a)
+        arm += contact.weights[a] * input.shells[contact.shell]->positions().col(contact.vertices[a]);
+    return arm;
+}
+
+/// By how much damping makes a mass harder to move.
+double damping(const IslandInput& input, const Shell& shell) {
+    return 1.0 + input.h * shell.material().massDamping;
+}
+
+}  // namespace
+
+/// The contacts' last word where they were settled in few rounds.
+void IslandSolver::Impl::pushOut(const IslandInput& input, StepReport& report) {
+    const auto solved = report.contacts.size();
+    response.pushOut(v, report.contacts);
+    for (std::size_t i = solved; i < report.contacts.size(); ++i) {
+        const auto& [contact, impulse, sticks, slip] = report.contacts[i];
+        input.bodies[contact.body].impulse -= pointImpulse(impulse, contactArm(input, contact));
+    }
+}
+
+/// Makes the ledger exact whatever the tolerance: what the contacts report, what the bodies got and what the shells'
+/// momentum changed by are the same to rounding. The residual that the solve left is spread over contacts and vertices.
+void IslandSolver::Impl::balance(const IslandInput& input, std::vector<ContactImpulse>& impulses) {
+    const auto count = input.bodies.size();
+    std::pmr::vector<Vec6> onBodies(count, Vec6::Zero(), &pool);
+    std::pmr::vector<double> pressed(count, 0.0, &pool);
+    const auto add = [&](int body, const Vec3& impulse, const Vec3& arm) {
+        onBodies[body] -= pointImpulse(impulse, arm);
+        pressed[body] += impulse.norm();
+    };
+    std::pmr::vector<char> isTouched(count, 0, &pool);
+    for (const auto& [contact, impulse, sticks, slip] : impulses) {
+        add(contact.body, impulse, contactArm(input, contact));
+        isTouched[contact.body] = 1;
+    }
+    for (Anchor& anchor : input.anchors) {
+        anchor.impulse = impulseShare * unfiltered().col(offsets[anchor.shell] + anchor.vertex);
+        add(anchor.body, -anchor.impulse, anchor.point - input.bodies[anchor.body].position);
+    }
+    for (std::size_t b = 0; b < count; ++b) {
+        Vec6& impulse = input.bodies[b].impulse;
+        if (input.bodies[b].prescribed || !(pressed[b] > 0.0))
+            impulse = onBodies[b];
+        else if (!isTouched[b])
+            impulse -= excessOf(static_cast<int>(b), impulse - onBodies[b]);
+    }
+    std::pmr::vector<Vec3> onShells(input.shells.size(), Vec3::Zero(), &pool);
+    const auto missing = [&](int body, const Vec3& impulse) -> Vec3 {
+        if (!(pressed[body] > 0.0)) return Vec3::Zero();
+        const Vec3 all = input.bodies[body].impulse.head<3>() - onBodies[body].head<3>();
+        return all * (impulse.norm() / pressed[body]);
+    };
+    for (auto& [contact, impulse, sticks, slip] : impulses) {
+        impulse -= missing(contact.body, impulse);
+        onShells[contact.shell] += impulse;
+    }
+    for (Anchor& anchor : input.anchors) {
+        anchor.impulse += missing(anchor.body, anchor.impulse);
+        onShells[anchor.shell] -= anchor.impulse;
+    }
+    shift(input, onShells, impulses);
+}
+
+/// What of a change of momentum is to be taken back so that a body's equations, of which the solve has left `residual`
+/// over, are fulfilled with the shells' velocities around it. Neither what its anchors give it nor its solved change of
+/// momentum would do: a light body far from its anchor would spin by that, and one that rests on something would be
+/// lifted off it.
+Vec6 IslandSolver::Impl::excessOf(int body, const Vec6& residual) const {
+    const int dynamic = dynamicIndex[body];
+    return supports.masses()[dynamic] * preconditioner.twistBy(dynamic, residual);
+}
+
+/// The shells' part of it. Walls take what is missing: a shell that they hold is stiff, and its mass would turn little
+/// force into much speed. A shell that touches none moves by it.
+void IslandSolver::Impl::shift(const IslandInput& input, std::span<const Vec3> onShells,
+                               std::vector<ContactImpulse>& impulses) {
+    system.velocities(u, reached);  // `v` may have been cut short since
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        const Shell& shell = *input.shells[k];
+        if (shell.pinCount() > 0) continue;
+        Vec3 given = -unfiltered().middleCols(offsets[k], shell.vertexCount()).rowwise().sum();
+        for (const auto& row : system.rows())
+            if (row.vertices[0] >= offsets[k] && row.vertices[0] < offsets[k] + shell.vertexCount())
+                given += system.rowImpulse(row, reached, u.w);
+        const Vec3 missing = impulseShare * given - onShells[k];
+        if (giveToWalls(input, static_cast<int>(k), missing, impulses)) continue;
+        v.middleCols(offsets[k], shell.vertexCount()).colwise() -=
+            (missing / (shell.masses().sum() * damping(input, shell))).eval();
+    }
+}
+
+/// Adds an impulse to those that walls have given a shell; false if there are none.
+bool IslandSolver::Impl::giveToWalls(const IslandInput& input, int shell, const Vec3& impulse,
+                                     std::vector<ContactImpulse>& impulses) const {
+    const auto isWalls = [&](const ContactImpulse& one) {
+        return one.contact.shell == shell && input.bodies[one.contact.body].prescribed;
+    };
+    double pressed = 0.0;
+    for (const ContactImpulse& one : impulses)
+        if (isWalls(one)) pressed += one.impulse.norm();
+    if (!(pressed > 0.0)) return false;
+    for (ContactImpulse& one : impulses) {
+        if (!isWalls(one)) continue;
+        const Vec3 part = impulse * (one.impulse.norm() / pressed);
+        one.impulse += part;
+        input.bodies[one.contact.body].impulse -= pointImpulse(part, contactArm(input, one.contact));
+    }
+    return true;
+}
+
+}  // namespace jacket

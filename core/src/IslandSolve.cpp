@@ -1,0 +1,288 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "EdgeStretch.h"
+#include "IslandImpl.h"
+#include "LapTimer.h"
+#include "ShellAssembly.h"
+
+/// Solves for the velocities of a step: linearisations, and in each the rounds of contacts with a linear solve.
+namespace jacket {
+namespace {
+
+constexpr double kEnergyGainAlone = 0.25;  ///< as kEnergyGain where nothing can be thrown
+constexpr double kMostGainOfFast = 0.1;    ///< as kMostEnergyGain where a body goes farther than it is thick
+
+constexpr double kRough = 0.03;     ///< tolerance of a rough solve
+constexpr int kLeastCompact = 200;  ///< vertices of a shell from which on a coarse space pays in double precision
+
+/// Of a shell that is strained by as much everywhere [J].
+double strainEnergy(const Shell& shell, double strain) {
+    const double area = shell.masses().sum() / shell.material().areaDensity();
+    return 0.5 * shell.material().stretchStiffness() * area * strain * strain;
+}
+
+}  // namespace
+
+/// One linear solve, as Baraff & Witkin have it. Only where it has stretched an edge far beyond what it was, which the
+/// linearisation at the start did not see coming (an unstressed sheet resists no motion out of its plane), it is
+/// linearised again at the end that it found. The other integrators go on until the velocities no longer change: one
+/// linearisation would cost BDF2 its second order wherever a shell turns far.
+void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report) {
+    constexpr int kMostNewtonSteps = 5, kMostToTheEnd = 30;
+    const bool toTheEnd = std::any_of(input.shells.begin(), input.shells.end(), [](const Shell* shell) {
+        return shell->settings().integrator != Integrator::BackwardEuler;
+    });
+    const int most = toTheEnd ? kMostToTheEnd : kMostNewtonSteps;
+    double leastGain = std::numeric_limits<double>::infinity();
+    int calmestStep = 1;
+    assemble(input, false);
+    for (int newton = 1;; ++newton) {
+        if (newton > 1) newtonFrom = v;  // most steps are over after the first
+        solveRounds(input, report);
+        if (!unfiltered().allFinite()) return;
+        const bool goOn = toTheEnd ? newton == 1 || improves(input) : overstretches(input, newton > 1);
+        if (!goOn) return;
+        if (const double gain = energyGain(input); gain < leastGain) {
+            leastGain = gain;
+            calmestStep = newton;
+            if (newton > 1) calmest.swap(newtonFrom);
+        }
+        if (newton == most) break;
+        assemble(input, true);
+    }
+    report.converged = report.converged && !toTheEnd;
+    if (energyGain(input) > std::max(leastGain, kEnergyGain)) {
+        v = calmestStep > 1 ? calmest : expected;  // as it is now, it may be anything
+        assemble(input, calmestStep > 1);          // back to what threw the shell about least
+        solveRounds(input, report);
+    }
+    const double mostGain = response.hasFastBody() && bodiesLead(input) ? kMostGainOfFast : kMostEnergyGain;
+    if (!unfiltered().allFinite()) return;
+    const bool isAmongWalls = dynamicBodies.empty() && !input.bodies.empty();
+    if (isAmongWalls && energyGain(input) > partOfStep * kEnergyGainAlone && descend(input, report)) return;
+    if (energyGain(input) > partOfStep * mostGain) limitDeformation(input, report);
+}
+
+/// Where Newton's method does not settle among walls: once more from standing still, which no contact forbids that only
+/// stops, and always downhill. So it gains no energy, wherever it ends. False if it did not come to that.
+bool IslandSolver::Impl::descend(const IslandInput& input, StepReport& report) {
+    constexpr int kMostSteps = 20, kMostHalvings = 20;
+    constexpr double kSettled = 1e-3;  // of what the first step brings
+    givesWay = false;
+    stepsInFull = 0;
+    gather(input);
+    beginContacts(input, true);
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        elasticAtStart[k] = input.shells[k]->elasticEnergy(input.shells[k]->positions());
+    limitPushes(input, kEnergyGain);
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        for (int i = 0; i < input.shells[k]->vertexCount(); ++i)
+            if (!input.shells[k]->isPinned(i)) v.col(offsets[k] + i).setZero();
+    double least = incrementalPotential(input, v), first = 0.0;
+    for (int step = 0; step < kMostSteps; ++step) {
+        newtonFrom = v;
+        assemble(input, true);
+        solveRounds(input, report);
+        if (!unfiltered().allFinite()) return false;
+        double now = incrementalPotential(input, v);
+        for (int i = 0; i < kMostHalvings && !(now < least); ++i) {
+            v = 0.5 * (v + newtonFrom);
+            now = incrementalPotential(input, v);
+        }
+        if (!(now < least)) v = newtonFrom;
+        const double gained = least - std::min(now, least);
+        least -= gained;
+        first = std::max(first, gained);
+        if (gained <= kSettled * first) break;
+    }
+    system.start(v, freeTwist, u);
+    report.limited = true;
+    return energyGain(input) <= partOfStep * kMostEnergyGain;
+}
+
+/// After one more Newton step: goes back along it until the incremental potential is not above what it was, and says
+/// whether it was long enough to be worth another.
+bool IslandSolver::Impl::improves(const IslandInput& input) {
+    constexpr double kSettled = 1e-3;  // of the step's change of velocity, or of what gravity does in it
+    constexpr int kMostHalvings = 8;
+    if (input.bodies.empty()) {
+        const double least = incrementalPotential(input, newtonFrom);
+        for (int i = 0; i < kMostHalvings && incrementalPotential(input, v) > least + 1e-12 * std::abs(least); ++i)
+            v = 0.5 * (v + newtonFrom);
+        system.start(v, freeTwist, u);
+    }
+    double change = 0.0, all = floorOfReference(input, 0.1);
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        for (int i = 0; i < input.shells[k]->vertexCount(); ++i) {
+            const double mass = input.shells[k]->masses()[i];
+            const int column = offsets[k] + i;
+            change += mass * (v.col(column) - newtonFrom.col(column)).squaredNorm();
+            all += mass * (v.col(column) - start.col(column)).squaredNorm();
+        }
+    return change > kSettled * kSettled * all;
+}
+
+/// Whether the solved step must be linearised again: it stretches an edge by far, or it gains energy. Backward Euler
+/// itself gains none; its one linear solve does where stiff shells turn far in a step. That is looked for only where
+/// edges change their lengths at all; `isAgain`: in a step that has been linearised again, for much of it in any case,
+/// and so where little strain may be much energy, as in sheet metal.
+bool IslandSolver::Impl::overstretches(const IslandInput& input, bool isAgain) const {
+    constexpr double kMost = 0.1, kSuspect = 1e-3;  // change of an edge in one step, in rest lengths
+    bool isSuspect = false, isToBeAsked = isAgain;
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        const Shell& shell = *input.shells[k];
+        const auto edges = shell.mesh().edges();
+        const EdgeStretch stretch =
+            edgeStretch(edges.data(), static_cast<int>(edges.size()), shell.m_restLength.data(),
+                        shell.positions().data(), v.data() + 3 * offsets[k], stepOf[k], teamFor(input));
+        if (stretch.lengthening > kMost) return true;
+        isSuspect = isSuspect || stretch.change > kSuspect;
+        isToBeAsked = isToBeAsked || strainEnergy(shell, stretch.change) > energyOfMotion(input, k);
+    }
+    if (!isSuspect) return isToBeAsked && energyGain(input) > kMostEnergyGain;
+    return energyGain(input) > (dynamicBodies.empty() ? kEnergyGainAlone : kEnergyGain);
+}
+
+void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
+    LapTimer lap(input);
+    WorkerTeam* const team = teamFor(input);
+    const bool isIncomplete = input.shells[0]->settings().preconditioner == Preconditioner::IncompleteCholesky;
+    parts.clear();
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        const int n = input.shells[k]->vertexCount();
+        const Eigen::Ref<const Points> ahead = (atEnd ? v : start).middleCols(offsets[k], n);
+        const StepSystem& step = input.shells[k]->m_assembly->assemble(
+            *input.shells[k], stepOf[k], input.gravity, input.wind, from().middleCols(offsets[k], n),
+            y.middleCols(offsets[k], n), atEnd ? &ahead : nullptr, team);
+        parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions(), factored[k] != 0,
+                         isIncomplete && !factored[k] && n >= kLeastCompact});
+    }
+    // Bodies that rest on the solution feel what single precision leaves over: soft rows and stacks lose their balance.
+    const bool isSingle = dynamicBodies.empty() && !isAnyFactored() &&
+                          linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance && isIncomplete;
+    system.begin(parts, static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(), supports.couplings(),
+                 isSingle ? Precision::Single : Precision::Double, team);
+    readFreeTwists();
+    reference = -1.0;
+    lap.addTo(times.assembly);
+}
+
+/// The least of the shells'. Bodies rest on the solution: what the solve leaves over is a force on them.
+double IslandSolver::Impl::linearTolerance(const IslandInput& input) const {
+    constexpr double kMostWithBodies = 1e-4;
+    double tolerance = input.shells[0]->settings().tolerance;
+    for (const Shell* shell : input.shells) tolerance = std::min(tolerance, shell->settings().tolerance);
+    return dynamicBodies.empty() ? tolerance : std::min(kMostWithBodies, 0.1 * tolerance);
+}
+
+void IslandSolver::Impl::readFreeTwists() {
+    freeTwist.resize(6, static_cast<Eigen::Index>(dynamicBodies.size()));
+    for (int b = 0; b < freeTwist.cols(); ++b) freeTwist.col(b) = supports.freeTwists()[b];
+}
+
+/// What gravity does in a step, so that a scene at rest is not solved to the last bit of nothing; a tenth of it where
+/// the preconditioner's norm makes little of what is left of it.
+double IslandSolver::Impl::floorOfReference(const IslandInput& input, double share) const {
+    double sum = 0.0;
+    for (const Shell* shell : input.shells) sum += shell->masses().sum();
+    const double kick = share * input.h * std::max(input.gravity.norm(), 1e-6);
+    return sum * kick * kick;
+}
+
+/// From `guess`, with the present contacts and preconditioner. The first solve of a step, but for small shells and in
+/// double precision, is from no change of velocity: the last change is in part what the last solve left over, to be
+/// undone and not to be repeated.
+PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, int maxIterations, StepReport& report) {
+    constexpr double kCompleteTolerance = 1e-6;  // of what a solve starts with, where it takes a few iterations
+    constexpr double kShare = 0.1;               // which leaves at most this of the residual that it starts with
+    constexpr int kLarge = 200;                  // vertices
+    const double tolerance = linearTolerance(input);
+    const bool isCoarse = preconditioner.isCoarse(system);
+    double rho = 0.0;
+    if (reference < 0.0 || system.precision() == Precision::Double) {
+        system.start(start, freeTwist, u);  // dv = 0
+        rho = pcg.begin(system, preconditioner, u);
+        reference = std::max(rho, floorOfReference(input, isCoarse ? 1.0 : 0.1));
+    }
+    if (report.solves > 0 || !isCoarse || start.cols() < kLarge) {
+        system.start(*guess, guessTwist, u);
+        rho = pcg.begin(system, preconditioner, u);
+    }
+    double target2 = tolerance * tolerance * reference;
+    if (preconditioner.isComplete()) target2 = std::min(target2, kCompleteTolerance * kCompleteTolerance * rho);
+    if (roughly) target2 = std::max(target2, std::min(kRough * kRough * reference, kShare * kShare * rho));
+    const PcgReport solve = pcg.finish(system, preconditioner, target2, 1.0, maxIterations, u);
+    ++report.solves;
+    report.pcgIterations += solve.iterations;
+    report.residual = solve.residual * std::sqrt(target2 / reference);
+    report.converged = solve.converged;
+    return solve;
+}
+
+/// With the factor of the last solve, or with a new one where there is none, `freshIterations` < 0, and where contacts
+/// have become others than it knows: then it uses up more than twice the iterations that it took when it was new.
+void IslandSolver::Impl::solveRound(const IslandInput& input, bool roughly, int& freshIterations, StepReport& report) {
+    int maxIterations = 0;
+    for (const Shell* shell : input.shells) maxIterations = std::max(maxIterations, shell->settings().maxIterations);
+    const bool isNew = freshIterations < 0 || preconditioner.isComplete() || system.precision() == Precision::Single;
+    if (!isNew) {
+        LapTimer lap(input);
+        preconditioner.updateBodies(system);
+        lap.addTo(times.factor);
+        const int most = std::min(maxIterations, 20 + 2 * freshIterations);
+        const bool isDone = solveOnce(input, roughly, most, report).converged || most == maxIterations;
+        lap.addTo(times.solve);
+        if (isDone) return;
+        system.velocities(u, v);
+        guess = &v;
+        guessTwist = u.w;
+    }
+    LapTimer lap(input);
+    const bool keepsCoarse = freshIterations >= 0 && system.precision() == Precision::Single;
+    preconditioner.build(system, input.shells[0]->settings().preconditioner, keepsCoarse);
+    lap.addTo(times.factor);
+    freshIterations = solveOnce(input, roughly, maxIterations, report).iterations;
+    lap.addTo(times.solve);
+}
+
+/// Until the contacts agree with the motion that they lead to. Where that is asked only once, and they changed in the
+/// last step, a rough solve tells enough, if it is by far cheaper than one to the tolerance.
+void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& report) {
+    guess = report.solves == 0 ? &expected : &v;
+    guessTwist = report.solves == 0 ? freeTwist : u.w;
+    u.resize(static_cast<int>(start.cols()), system.bodyCount());
+    int freshIterations = -1;  // of the first solve with the present factor
+    const bool isCheap = linearTolerance(input) < 0.1 * kRough;
+    bool roughly = isCheap && response.isQuick() && response.hasContacts() && lastRounds > 1;
+    int round = 0;
+    for (;;) {
+        LapTimer writing(input);
+        response.writeTo(system);
+        writing.addTo(times.contact);
+        solveRound(input, roughly, freshIterations, report);
+        LapTimer lap(input);
+        if (!u.allFinite() || !unfiltered().allFinite()) return;
+        system.velocities(u, v);
+        lap.addTo(times.solve);
+        const bool changed = response.update(system, {v, u.w, unfiltered()}, y, round, roughly);
+        lap.addTo(times.contact);
+        // What stiff shells do while their contacts are not settled would tip a body off what bears it.
+        const bool isTelling = !preconditioner.isComplete() || (!changed && !response.isLast(round));
+        const bool lifted = isTelling && supports.update(u.w, input.h * input.gravity.norm());
+        if (lifted) {
+            system.setBodies(supports.masses(), supports.freeTwists(), supports.couplings());
+            readFreeTwists();
+        }
+        if (!changed && !lifted && !roughly) break;
+        roughly = false;
+        if (changed) ++round;
+        guess = &v;
+        guessTwist = u.w;
+    }
+    lastRounds = round + 1;
+    unsettled |= !response.isQuick() && response.isLast(round);
+}
+
+}  // namespace jacket
