@@ -7,6 +7,7 @@
 
 #include "Bodies.h"
 #include "Clocks.h"
+#include "CollisionPools.h"
 #include "Convert.h"
 #include "Meshes.h"
 #include "SoftSheet.h"
@@ -49,7 +50,7 @@ struct SoftWorld::Impl {
     }
 
     Scene scene;
-    btSoftBodyRigidBodyCollisionConfiguration configuration;
+    btSoftBodyRigidBodyCollisionConfiguration configuration{smallPools()};
     btCollisionDispatcher dispatcher{&configuration};
     btDbvtBroadphase broadphase;
     btSequentialImpulseConstraintSolver solver;

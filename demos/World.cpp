@@ -10,6 +10,7 @@
 
 #include "Bodies.h"
 #include "Clocks.h"
+#include "CollisionPools.h"
 #include "Convert.h"
 #include "Loads.h"
 #include "Meshes.h"
@@ -35,6 +36,7 @@ struct World::Impl {
     }
 
     explicit Impl(const Scene& s) : scene(s) {
+        configuration.setPlaneConvexMultipointIterations();  // else a box on a plane gets one corner a step
         for (std::size_t k = 0; k < scene.shells.size(); ++k) addShell(scene.shells[k], scene.seed + k);
         for (const ProbeDescription& probe : scene.probes)
             if (probe.where) probe.where->vertices(starts[probe.shell]);  // throws now rather than after the run
@@ -183,7 +185,7 @@ struct World::Impl {
     }
 
     Scene scene;
-    btDefaultCollisionConfiguration configuration;
+    btDefaultCollisionConfiguration configuration{smallPools()};
     btCollisionDispatcher dispatcher{&configuration};
     btDbvtBroadphase broadphase;
     std::unique_ptr<btConstraintSolver> solver;

@@ -216,7 +216,6 @@ class BoxOverAnEdge : public ::testing::TestWithParam<double> {};
 
 TEST_P(BoxOverAnEdge, ComesToRestOnIt) {
     Scene scene;
-    scene.configuration.setPlaneConvexMultipointIterations();  // else Bullet finds one corner on the floor a step
     scene.addFloor();
     TriangleMesh mesh = squareSheet(0.8, 5);
     mesh.positions.row(1).array() += 5e-4;
