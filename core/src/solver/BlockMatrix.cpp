@@ -9,7 +9,7 @@
 namespace jacket {
 namespace {
 
-constexpr int kRowsAtATime = 512;  ///< that a thread of a team takes
+constexpr int kBlockRowsAtATime = 512;  ///< that a thread of a team takes
 
 /// As plain memory. Blocks are nine numbers by columns; x is in fours, with a number before it that may be anything.
 template <class Column>
@@ -167,7 +167,7 @@ void BlockMatrix::setZero() {
 
 void BlockMatrix::multiply(const double* x, double* y, WorkerTeam* team) const {
     double* const inFours = padded();
-    runRanges(team, size(), kRowsAtATime, [&](int begin, int end) {
+    runRanges(team, size(), kBlockRowsAtATime, [&](int begin, int end) {
         for (int i = begin; i < end; ++i) std::copy_n(x + 3 * i, 3, inFours + 4 * i);
     });
     const auto multiplyWith = [&](const auto& scalars) {
@@ -181,7 +181,8 @@ void BlockMatrix::multiply(const double* x, double* y, WorkerTeam* team) const {
                                 scalars,
                                 m_besideFactor,
                                 inFours};
-        runRanges(team, size(), kRowsAtATime, [&](int begin, int end) { multiplyKernel(operands, begin, end, y); });
+        runRanges(team, size(), kBlockRowsAtATime,
+                  [&](int begin, int end) { multiplyKernel(operands, begin, end, y); });
     };
     if (!m_beside) return multiplyWith(ConstantHessian::Rows<int>{});
     m_beside->visit([&](const auto&, const auto& scalars) { multiplyWith(scalars); });
