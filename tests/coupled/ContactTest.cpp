@@ -210,6 +210,52 @@ INSTANTIATE_TEST_SUITE_P(Shapes, LyingBody,
                          ::testing::Combine(::testing::Values("box", "cylinder", "capsule"),
                                             ::testing::Values(kStep, kStep / 4)));
 
+/// All of a cylinder's base is as deep in a face that is larger: each solve finds another point of its rim.
+class UprightCylinder : public ::testing::TestWithParam<std::tuple<double, double>> {};
+
+TEST_P(UprightCylinder, StandsOnATriangleLargerThanIt) {
+    const auto [mass, h] = GetParam();
+    Scene scene;
+    scene.addFloor();
+    TriangleMesh mesh = squareSheet(0.6, 2);
+    mesh.positions.row(1).array() += 2e-3;
+    auto& sheet = scene.shells->add(mesh, materials::cotton(), {.friction = 0.5});
+    auto& cylinder =
+        scene.addBody(std::make_unique<btCylinderShape>(btVector3(btScalar(0.02), btScalar(0.03), btScalar(0.02))),
+                      mass, btVector3(btScalar(0.03), btScalar(0.037), btScalar(0.05)));
+    scene.run(2.0, h);
+    const Vec3 before = toVec3(cylinder.getWorldTransform().getOrigin());
+    int unsettled = 0;
+    for (double t = 0.0; t < 2.0; t += h) {
+        scene.step(h);
+        unsettled += scene.shells->lastStep().settled ? 0 : 1;
+    }
+    EXPECT_EQ(unsettled, 0);
+    EXPECT_LT(penetration(sheet, cylinder), 2e-4);
+    EXPECT_LT((toVec3(cylinder.getWorldTransform().getOrigin()) - before).norm(), 1e-3);
+    EXPECT_GT(double(cylinder.getWorldTransform().getBasis()[1][1]), 0.999);
+}
+INSTANTIATE_TEST_SUITE_P(Grid, UprightCylinder,
+                         ::testing::Combine(::testing::Values(0.01, 0.1, 1.0), ::testing::Values(kStep, kStep / 4)));
+
+/// A ball that falls onto a triangle is inside the corners around it by the end of the step, but does not reach them:
+/// they are not what stops it, or it would be thrown aside.
+class BallThatComesDown : public ::testing::TestWithParam<std::tuple<double, double>> {};
+
+TEST_P(BallThatComesDown, StaysWhereItFell) {
+    const auto [mass, h] = GetParam();
+    Scene scene;
+    auto& sheet = scene.shells->add(squareSheet(0.6, 7), materials::steel(1e-3), {.friction = 0.5});
+    pinBorder(sheet);
+    auto& ball = scene.addSphere(0.025, mass, btVector3(btScalar(0.03), btScalar(0.035), btScalar(0.05)));
+    scene.run(0.5, h);
+    const btVector3 end = ball.getWorldTransform().getOrigin();
+    EXPECT_LT(std::hypot(double(end.x()) - 0.03, double(end.z()) - 0.05), 1e-2);
+    EXPECT_LT(penetration(sheet, ball), 2e-4);
+}
+INSTANTIATE_TEST_SUITE_P(Grid, BallThatComesDown,
+                         ::testing::Combine(::testing::Values(0.01, 0.1, 1.0), ::testing::Values(kStep, kStep / 4)));
+
 /// A box that stands on the edge of sheet metal that lies on a floor, and on the floor beside it: the edge touches it
 /// in two places, and it is lifted out of the sheet by both.
 class BoxOverAnEdge : public ::testing::TestWithParam<double> {};

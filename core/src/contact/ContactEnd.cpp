@@ -11,7 +11,7 @@ constexpr double kMostOffset =
 constexpr double kDeep = 0.1;        // of an edge: what is worth another solve where few are made
 constexpr double kMostPush = 0.2;    // of an edge: how far pushOut goes
 constexpr int kMostTurns = 8;        // of the walls of a valley, at pushing
-constexpr double kSamePoint = 0.15;  // of an edge: how far it may move in a round
+constexpr double kSamePoint = 0.15;  // of an edge, or the body's radius: how far it may move in a round
 constexpr double kSameWay = 0.7;     // cosine of the angle between normals that push a vertex much the same way
 constexpr double kTheSame = 0.995;   // the same of one that says what another does
 constexpr int kFreezeRound = 7;      // from here on normals stay: a triangle that tips to and fro would never settle
@@ -36,7 +36,7 @@ void ContactResponse::findAtEnd(const IslandVelocities& solved, const Points& y)
     m_endPoses.clear();
     for (const Points& end : m_end) m_endPoses.push_back(&end);
     m_found.clear();
-    const double faceSlop = m_backed.empty() ? m_faceSlop : std::min(m_vertexSlop, m_faceSlop);
+    const double faceSlop = m_backed.empty() && !m_isAnyStiff ? m_faceSlop : std::min(m_vertexSlop, m_faceSlop);
     m_input.contacts->find({m_endPoses, m_endTwists, m_input.h}, -m_vertexSlop, -faceSlop, m_found);
     std::sort(m_found.begin(), m_found.end(), [](const Contact& a, const Contact& b) { return a.gap < b.gap; });
     dropPassed();
@@ -137,7 +137,8 @@ int ContactResponse::touchOf(const Contact& contact) const {
     const auto isNear = [&](const Touch& touch) {
         const Contact& other = touch.contact;
         return !other.isVertex() && other.shell == contact.shell && other.body == contact.body &&
-               (other.point - contact.point).norm() < kSamePoint * m_edge[contact.shell];
+               (other.point - contact.point).norm() <
+                   kSamePoint * std::min(m_edge[contact.shell], m_input.bodies[contact.body].radius);
     };
     const auto stays = [&](const Touch& touch) { return touch.active && touch.isPlaced && !isNear(touch); };
     if (known != m_index.end() && !stays(m_touches[known->second])) return known->second;

@@ -163,11 +163,20 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     m_still.assign(input.bodies.size(), Vec6::Zero());
     m_found.clear();
     m_backed.clear();
-    const bool isSurface = mayBeBacked();  // by walls, or by pins everywhere: known before anything is found
+    m_isAnyStiff = hasFreeBodies() && std::any_of(input.shells.begin(), input.shells.end(),
+                                                  [&](const Shell* shell) { return isHeldStiff(*shell); });
+    const bool isSurface =
+        mayBeBacked() || m_isAnyStiff;  // by walls, or by pins everywhere: known before anything is found
     const double faceReach = isSurface ? reach : m_memory.empty() ? kNone : 10.0 * m_vertexSlop;
     input.contacts->find({m_startPoses, m_still, 0.0}, reach, faceReach, m_found);
     const bool isBesidePin = !isSurface && mayBeBacked();
     if (isBesidePin) {
+        m_found.clear();
+        input.contacts->find({m_startPoses, m_still, 0.0}, reach, reach, m_found);
+    }
+    findComing();
+    const bool isAnyComing = std::find(m_comes.begin(), m_comes.end(), 1) != m_comes.end();
+    if (isAnyComing && !isSurface && !isBesidePin) {
         m_found.clear();
         input.contacts->find({m_startPoses, m_still, 0.0}, reach, reach, m_found);
     }
@@ -210,7 +219,8 @@ double ContactResponse::creepSpeed() const {
 
 void ContactResponse::addAtStart(const Contact& contact, Points& y) {
     Memory* const memory = remembered(contact);
-    if (!contact.isVertex() && !memory && !isBacked(contact)) return;  // found at the end of the step if it matters
+    if (!contact.isVertex() && !memory && !isSurface(contact) && !m_comes[contact.body])
+        return;  // found at the end of the step if it matters
     Touch touch = makeTouch(contact);
     touch.startGap = contact.gap;
     if (memory && memory->offset > 0.0) {
@@ -263,6 +273,22 @@ void ContactResponse::findRoomBesideFaces() {
     }
 }
 
+/// Free bodies that will touch a vertex of a shell with pins in this step and touched nothing in the last. A ball that
+/// comes down on a triangle meets it before its corners, which would throw it aside. (What is free itself goes along
+/// with what hits it, by one corner as well as by all; and fingers close on it from both sides.)
+void ContactResponse::findComing() {
+    m_comes.assign(m_input.bodies.size(), 0);
+    if (!hasFreeBodies()) return;
+    for (const Contact& contact : m_found)
+        if (contact.isVertex() && m_dynamicIndex[contact.body] >= 0 && !m_comes[contact.body] &&
+            m_input.shells[contact.shell]->pinCount() > 0)
+            m_comes[contact.body] = timeOfTouch(makeTouch(contact)) <= m_input.h;
+    for (std::size_t b = 0; b < m_comes.size(); ++b) {
+        const auto isOf = [&](const auto& known) { return std::get<1>(known.first) == m_input.bodies[b].key; };
+        if (m_comes[b] && std::any_of(m_memory.begin(), m_memory.end(), isOf)) m_comes[b] = 0;
+    }
+}
+
 /// Whether some vertex may be held, by a pin or a wall, where a free body touches it: in a sheet that is pinned by its
 /// edge only those near the edge are, and the others need no faces.
 bool ContactResponse::mayBeBacked() const {
@@ -303,6 +329,18 @@ bool ContactResponse::isBacked(const Contact& contact) const {
     return true;
 }
 
+bool ContactResponse::isHeldStiff(const Shell& shell) const {
+    return shell.pinCount() > 0 && shell.isStiffAsAWhole(m_input.h);
+}
+
+/// Whether a free body touches the sheet as a surface there, which does not give way to it: it is backed, or stiff and
+/// held.
+bool ContactResponse::isSurface(const Contact& contact) const {
+    const bool isStiff =
+        m_isAnyStiff && m_dynamicIndex[contact.body] >= 0 && isHeldStiff(*m_input.shells[contact.shell]);
+    return isStiff || isBacked(contact);
+}
+
 /// With which a free body leaves a surface that it stands inside and that cannot give way [m/s]: in steps that take
 /// back a share of the depth, and never so fast that it would rise above the surface.
 double ContactResponse::speedOutOf(double depth) const {
@@ -313,7 +351,7 @@ double ContactResponse::speedOutOf(double depth) const {
 /// face, another way: not there do they touch. A ball that has rolled over them would be pushed on by them, and one
 /// that comes to them would be held back. Where a sheet gives way it follows the body, and its vertices bear.
 void ContactResponse::dropPassed() {
-    if (m_backed.empty()) return;
+    if (m_backed.empty() && !m_isAnyStiff) return;
     std::pmr::multimap<std::pair<int, int>, const Contact*> faces(&m_pool);  // of vertex and body
     for (const Contact& contact : m_found)
         for (int a = 0; a < 3 && !contact.isVertex(); ++a)
@@ -325,7 +363,7 @@ void ContactResponse::dropPassed() {
         return std::any_of(first, last, [&](const auto& face) { return isBeside(contact, *face.second); });
     };
     std::pmr::vector<char> drops(&m_pool);
-    for (const Contact& contact : m_found) drops.push_back(isBacked(contact) && isPassed(contact));
+    for (const Contact& contact : m_found) drops.push_back(isSurface(contact) && isPassed(contact));
     std::erase_if(m_found, [&](const Contact& contact) { return drops[&contact - m_found.data()] != 0; });
 }
 
@@ -342,7 +380,7 @@ bool ContactResponse::isBeside(const Contact& contact, const Contact& face) {
 }
 
 double ContactResponse::slopOf(const Contact& contact) const {
-    return contact.isVertex() || isBacked(contact) ? m_vertexSlop : m_faceSlop;
+    return contact.isVertex() || isSurface(contact) ? m_vertexSlop : m_faceSlop;
 }
 
 /// Bodies that move farther relative to some vertex than they are thick, or free ones half as far: from inside them the

@@ -177,9 +177,12 @@ class ContactResponse {
     bool closeFirst(int round);
     bool closePassed(const Contact& contact, int round);
     void findRoomBesideFaces();
+    void findComing();
     bool mayBeBacked() const;
     void findBacked();
     bool isBacked(const Contact& contact) const;
+    bool isHeldStiff(const Shell& shell) const;
+    bool isSurface(const Contact& contact) const;
     double speedOutOf(double depth) const;
     void dropPassed();
     static bool isBeside(const Contact& contact, const Contact& face);
@@ -260,8 +263,10 @@ class ContactResponse {
     std::vector<Points> m_end;      ///< where the solved motion ends, of each shell
     std::vector<Vec6> m_endTwists;  ///< of each body
     std::vector<char> m_fast;       ///< per body: may pass a shell within the step
+    std::vector<char> m_comes;      ///< per body: see findComing
     bool m_anyFast = false;
-    bool m_onlyStops = false;  ///< see Numbering
+    bool m_isAnyStiff = false;  ///< a shell with pins, as a whole, beside free bodies
+    bool m_onlyStops = false;   ///< see Numbering
     std::vector<Contact> m_found;
     std::pmr::map<int, double> m_room{&m_pool};            ///< of vertices: see findRoomBesideFaces [m]
     std::pmr::set<std::pair<int, int>> m_backed{&m_pool};  ///< (vertex, free body): see findBacked
