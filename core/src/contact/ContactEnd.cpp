@@ -36,7 +36,7 @@ void ContactResponse::findAtEnd(const IslandVelocities& solved, const Points& y)
     m_endPoses.clear();
     for (const Points& end : m_end) m_endPoses.push_back(&end);
     m_found.clear();
-    const double faceSlop = m_backed.empty() && !m_isAnyStiff ? m_faceSlop : std::min(m_vertexSlop, m_faceSlop);
+    const double faceSlop = hasSurfaces() ? std::min(m_vertexSlop, m_faceSlop) : m_faceSlop;
     m_input.contacts->find({m_endPoses, m_endTwists, m_input.h}, -m_vertexSlop, -faceSlop, m_found);
     std::sort(m_found.begin(), m_found.end(), [](const Contact& a, const Contact& b) { return a.gap < b.gap; });
     dropPassed();

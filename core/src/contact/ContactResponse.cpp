@@ -161,26 +161,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     m_startPoses.clear();
     for (const Shell* shell : input.shells) m_startPoses.push_back(&shell->positions());
     m_still.assign(input.bodies.size(), Vec6::Zero());
-    m_found.clear();
-    m_backed.clear();
-    m_isAnyStiff = hasFreeBodies() && std::any_of(input.shells.begin(), input.shells.end(),
-                                                  [&](const Shell* shell) { return isHeldStiff(*shell); });
-    const bool isSurface =
-        mayBeBacked() || m_isAnyStiff;  // by walls, or by pins everywhere: known before anything is found
-    const double faceReach = isSurface ? reach : m_memory.empty() ? kNone : 10.0 * m_vertexSlop;
-    input.contacts->find({m_startPoses, m_still, 0.0}, reach, faceReach, m_found);
-    const bool isBesidePin = !isSurface && mayBeBacked();
-    if (isBesidePin) {
-        m_found.clear();
-        input.contacts->find({m_startPoses, m_still, 0.0}, reach, reach, m_found);
-    }
-    findComing();
-    const bool isAnyComing = std::find(m_comes.begin(), m_comes.end(), 1) != m_comes.end();
-    if (isAnyComing && !isSurface && !isBesidePin) {
-        m_found.clear();
-        input.contacts->find({m_startPoses, m_still, 0.0}, reach, reach, m_found);
-    }
-    if (isSurface || isBesidePin) findBacked();
+    findAtStart(reach);
     dropPassed();
     findRoomBesideFaces();
     findHeirs();
@@ -191,6 +172,28 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     if (m_anyFast) sweepAtStart();
     if (m_anyFast && numbering.mayBeShorter && !hasFreeBodies() && !isAnyBouncy()) m_care = kInPassing;
     keepEarliest();
+}
+
+/// What is near at the start of the step, into m_found. Faces are looked for where the last step held any, and as far
+/// as vertices where free bodies meet surfaces, or come: known by walls, by pins everywhere and by stiff shells before
+/// anything is found, else by the vertices that are.
+void ContactResponse::findAtStart(double reach) {
+    const auto find = [&](double faceReach) {
+        m_found.clear();
+        m_input.contacts->find({m_startPoses, m_still, 0.0}, reach, faceReach, m_found);
+    };
+    m_found.clear();
+    m_backed.clear();
+    m_stiff.clear();
+    for (const Shell* shell : m_input.shells)
+        m_stiff.push_back(hasFreeBodies() && shell->pinCount() > 0 && shell->isStiffAsAWhole(m_input.h));
+    const bool areSurfaces = mayBeBacked() || hasSurfaces();
+    find(areSurfaces ? reach : m_memory.empty() ? kNone : 10.0 * m_vertexSlop);
+    findComing();
+    const bool isAnyComing = std::find(m_comes.begin(), m_comes.end(), 1) != m_comes.end();
+    const bool isBesidePin = !areSurfaces && mayBeBacked();
+    if (!areSurfaces && (isBesidePin || isAnyComing)) find(reach);
+    if (areSurfaces || isBesidePin) findBacked();
 }
 
 bool ContactResponse::hasFreeBodies() const {
@@ -329,16 +332,14 @@ bool ContactResponse::isBacked(const Contact& contact) const {
     return true;
 }
 
-bool ContactResponse::isHeldStiff(const Shell& shell) const {
-    return shell.pinCount() > 0 && shell.isStiffAsAWhole(m_input.h);
+bool ContactResponse::hasSurfaces() const {
+    return !m_backed.empty() || std::find(m_stiff.begin(), m_stiff.end(), 1) != m_stiff.end();
 }
 
 /// Whether a free body touches the sheet as a surface there, which does not give way to it: it is backed, or stiff and
 /// held.
 bool ContactResponse::isSurface(const Contact& contact) const {
-    const bool isStiff =
-        m_isAnyStiff && m_dynamicIndex[contact.body] >= 0 && isHeldStiff(*m_input.shells[contact.shell]);
-    return isStiff || isBacked(contact);
+    return (m_stiff[contact.shell] && m_dynamicIndex[contact.body] >= 0) || isBacked(contact);
 }
 
 /// With which a free body leaves a surface that it stands inside and that cannot give way [m/s]: in steps that take
@@ -351,7 +352,7 @@ double ContactResponse::speedOutOf(double depth) const {
 /// face, another way: not there do they touch. A ball that has rolled over them would be pushed on by them, and one
 /// that comes to them would be held back. Where a sheet gives way it follows the body, and its vertices bear.
 void ContactResponse::dropPassed() {
-    if (m_backed.empty() && !m_isAnyStiff) return;
+    if (!hasSurfaces()) return;
     std::pmr::multimap<std::pair<int, int>, const Contact*> faces(&m_pool);  // of vertex and body
     for (const Contact& contact : m_found)
         for (int a = 0; a < 3 && !contact.isVertex(); ++a)

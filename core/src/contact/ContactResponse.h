@@ -176,12 +176,13 @@ class ContactResponse {
     void sweepToEnd();
     bool closeFirst(int round);
     bool closePassed(const Contact& contact, int round);
+    void findAtStart(double reach);
     void findRoomBesideFaces();
     void findComing();
     bool mayBeBacked() const;
     void findBacked();
     bool isBacked(const Contact& contact) const;
-    bool isHeldStiff(const Shell& shell) const;
+    bool hasSurfaces() const;
     bool isSurface(const Contact& contact) const;
     double speedOutOf(double depth) const;
     void dropPassed();
@@ -265,7 +266,7 @@ class ContactResponse {
     std::vector<char> m_fast;       ///< per body: may pass a shell within the step
     std::vector<char> m_comes;      ///< per body: see findComing
     bool m_anyFast = false;
-    bool m_isAnyStiff = false;  ///< a shell with pins, as a whole, beside free bodies
+    std::vector<char> m_stiff;  ///< per shell: has pins and is stiff as a whole, beside free bodies
     bool m_onlyStops = false;   ///< see Numbering
     std::vector<Contact> m_found;
     std::pmr::map<int, double> m_room{&m_pool};            ///< of vertices: see findRoomBesideFaces [m]
