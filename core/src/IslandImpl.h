@@ -91,6 +91,7 @@ struct IslandSolver::Impl {
     double linearTolerance(const IslandInput& input) const;
     void readFreeTwists();
     double floorOfReference(const IslandInput& input, double share) const;
+    bool mayFallIn(const IslandInput& input) const;
     PcgReport solveOnce(const IslandInput& input, bool roughly, int maxIterations, StepReport& report);
     void solveRound(const IslandInput& input, bool roughly, int& freshIterations, StepReport& report);
     void solveRounds(const IslandInput& input, StepReport& report);

@@ -191,12 +191,22 @@ double IslandSolver::Impl::floorOfReference(const IslandInput& input, double sha
     return sum * kick * kick;
 }
 
-/// From `guess`, with the present contacts and preconditioner. The first solve of a step, but for small shells and in
+/// Whether what a solve leaves over may be the weight of a shell that bodies alone hold: balance takes from it what no
+/// contact has given.
+bool IslandSolver::Impl::mayFallIn(const IslandInput& input) const {
+    return response.hasContacts() && !input.gravity.isZero(0.0) &&
+           std::any_of(input.shells.begin(), input.shells.end(), [](const Shell* s) { return s->pinCount() == 0; });
+}
+
+/// From `guess`, with the present contacts and preconditioner. To the tolerance; but where a shell is strained, or
+/// moves fast, that may be more than its weight: see mayFallIn. The first solve of a step, but for small shells and in
 /// double precision, is from no change of velocity: the last change is in part what the last solve left over, to be
 /// undone and not to be repeated.
 PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, int maxIterations, StepReport& report) {
     constexpr double kCompleteTolerance = 1e-6;  // of what a solve starts with, where it takes a few iterations
     constexpr double kShare = 0.1;               // which leaves at most this of the residual that it starts with
+    constexpr double kMostOfGravity = 0.1;       // of what gravity does in a step
+    constexpr double kMostDigits = 0.01;         // of the tolerance
     constexpr int kLarge = 200;                  // vertices
     const double tolerance = linearTolerance(input);
     const bool isCoarse = preconditioner.isCoarse(system);
@@ -212,6 +222,8 @@ PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, 
     }
     double target2 = tolerance * tolerance * reference;
     if (preconditioner.isComplete()) target2 = std::min(target2, kCompleteTolerance * kCompleteTolerance * rho);
+    if (const double most2 = floorOfReference(input, kMostOfGravity); most2 < target2 && mayFallIn(input))
+        target2 = std::max(most2, kMostDigits * kMostDigits * target2);
     if (roughly) target2 = std::max(target2, std::min(kRough * kRough * reference, kShare * kShare * rho));
     const PcgReport solve = pcg.finish(system, preconditioner, target2, 1.0, maxIterations, u);
     ++report.solves;
