@@ -53,7 +53,7 @@ class ContactResponse {
     /// Whether nothing rests on the contacts and the shells give way: they are then looked at once, after a rough
     /// solve if that is by far cheaper, again only where a contact pulls by much or a vertex ends deep inside a body,
     /// and pushOut does what is left.
-    bool isQuick() const { return m_care.rounds < kInFull.rounds; }
+    bool isQuick() const { return m_care.rounds <= kAmongWalls.rounds; }
     /// By what pushOut would move vertices, of which some stay where they are [m].
     const std::pmr::map<int, Vec3>& pushes(const Points& v);
     /// Whether a round is the last one that may be.
