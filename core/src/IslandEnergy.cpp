@@ -7,6 +7,15 @@
 
 /// What energy a step starts with and gains, by which others judge it.
 namespace jacket {
+namespace {
+
+/// What a body that is moved does by an impulse on a shell [J]. Where it turns, or is round, its surface comes to a
+/// place otherwise than the point of it that is there when the step begins: the shell's velocity tells how.
+double workOfWall(const Vec3& impulse, const Vec3& carried, const Vec3& velocity) {
+    return carried.isZero(0.0) ? 0.0 : std::max({0.0, impulse.dot(carried), impulse.dot(velocity)});
+}
+
+}  // namespace
 
 /// Where velocities lead a shell, in its scratch.
 Points& IslandSolver::Impl::endAfter(std::size_t k, const IslandInput& input, const Points& velocities) const {
@@ -102,12 +111,14 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
     double fastest2 = 0.0;
     for (const auto& held : system.constraints()) {  // work of pins and bodies that are moved
         if (held.body >= 0) continue;
-        gain -= std::max(0.0, -unfiltered().col(held.vertex).dot(held.carried));
+        gain -= workOfWall(-unfiltered().col(held.vertex), held.carried, v.col(held.vertex));
         fastest2 = std::max(fastest2, held.carried.squaredNorm());
     }
     for (const auto& row : system.rows()) {
         if (row.body >= 0) continue;
-        gain -= std::max(0.0, system.rowImpulse(row, v, u.w).dot(row.carried));
+        Vec3 velocity = Vec3::Zero();
+        for (int a = 0; a < 3; ++a) velocity += row.weights[a] * v.col(row.vertices[a]);
+        gain -= workOfWall(system.rowImpulse(row, v, u.w), row.carried, velocity);
         fastest2 = std::max(fastest2, row.carried.squaredNorm());
     }
     // Jammed between walls the work is any number; but what they push cannot be much faster than they are.

@@ -104,21 +104,28 @@ void IslandSolver::Impl::shift(const IslandInput& input, std::span<const Vec3> o
     }
 }
 
-/// Adds an impulse to those that walls have given a shell; false if there are none.
+/// Adds an impulse to those that walls have given a shell by contacts and anchors; false if there are none.
 bool IslandSolver::Impl::giveToWalls(const IslandInput& input, int shell, const Vec3& impulse,
                                      std::vector<ContactImpulse>& impulses) const {
-    const auto isWalls = [&](const ContactImpulse& one) {
-        return one.contact.shell == shell && input.bodies[one.contact.body].prescribed;
-    };
+    const auto isWalls = [&](int ofShell, int body) { return ofShell == shell && input.bodies[body].prescribed; };
     double pressed = 0.0;
     for (const ContactImpulse& one : impulses)
-        if (isWalls(one)) pressed += one.impulse.norm();
+        if (isWalls(one.contact.shell, one.contact.body)) pressed += one.impulse.norm();
+    for (const Anchor& anchor : input.anchors)
+        if (isWalls(anchor.shell, anchor.body)) pressed += anchor.impulse.norm();
     if (!(pressed > 0.0)) return false;
     for (ContactImpulse& one : impulses) {
-        if (!isWalls(one)) continue;
+        if (!isWalls(one.contact.shell, one.contact.body)) continue;
         const Vec3 part = impulse * (one.impulse.norm() / pressed);
         one.impulse += part;
         input.bodies[one.contact.body].impulse -= pointImpulse(part, contactArm(input, one.contact));
+    }
+    for (Anchor& anchor : input.anchors) {
+        if (!isWalls(anchor.shell, anchor.body)) continue;
+        CoupledBody& body = input.bodies[anchor.body];
+        const Vec3 part = impulse * (anchor.impulse.norm() / pressed);
+        anchor.impulse -= part;
+        body.impulse -= pointImpulse(part, anchor.point - body.position);
     }
     return true;
 }

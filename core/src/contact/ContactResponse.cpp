@@ -1,5 +1,6 @@
 #include "contact/ContactResponse.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -101,10 +102,25 @@ void ContactResponse::place(Touch& touch, const Contact& contact) const {
     touch.dynamicBody = m_dynamicIndex[contact.body];
 }
 
-/// Surface velocity of a prescribed body there, 0 of others [m/s].
-Vec3 ContactResponse::carriedOf(const Touch& touch) const {
-    const CoupledBody& body = m_input.bodies[touch.contact.body];
-    return body.prescribed ? pointVelocity(body.freeTwist, touch.arm) : Vec3::Zero();
+/// Mean velocity in the step of what a prescribed body has there, 0 of others: along the chord of its way, as what goes
+/// along the tangents in every step leaves a body that turns [m/s].
+Vec3 ContactResponse::carriedOf(int body, const Vec3& arm) const {
+    if (!m_input.bodies[body].prescribed) return Vec3::Zero();
+    return m_input.bodies[body].freeTwist.head<3>() + m_chords[body] * arm;
+}
+
+/// Of each prescribed body, mean velocity from arm in its rotation by the step's end: (exp(h [w]x) - 1) / h.
+void ContactResponse::findChords() {
+    m_chords.clear();
+    for (const CoupledBody& body : m_input.bodies) {
+        const Vec3 spin = body.freeTwist.tail<3>();
+        const double angle = body.prescribed ? m_input.h * spin.norm() : 0.0;
+        makeRoom(m_chords);
+        m_chords.push_back(Mat3::Zero());
+        if (angle == 0.0) continue;
+        m_chords.back() = Eigen::AngleAxisd(angle, spin.normalized()).toRotationMatrix() - Mat3::Identity();
+        m_chords.back() /= m_input.h;
+    }
 }
 
 ContactResponse::Touch ContactResponse::makeTouch(const Contact& contact) const {
@@ -146,6 +162,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
         speed = std::max(speed, shell.velocities().colwise().norm().maxCoeff());
     }
     for (const auto& anchor : input.anchors) m_held[m_offsets[anchor.shell] + anchor.vertex] = 1;
+    findChords();
     if (!input.contacts) return;
 
     const Care inFull = hasFreeBodies() ? kInFull : kAtLength;
@@ -487,7 +504,7 @@ void ContactResponse::holdVertices() {
         VertexConstraint c{.vertex = m_offsets[anchor.shell] + anchor.vertex, .body = m_dynamicIndex[anchor.body]};
         c.arm = anchor.point - body.position;
         c.z = (anchor.point - shell.positions().col(anchor.vertex)) / m_input.h;
-        if (body.prescribed) c.carried = pointVelocity(body.freeTwist, c.arm);
+        c.carried = carriedOf(anchor.body, c.arm);
         m_constraints.push_back(c);
     }
 }

@@ -166,7 +166,9 @@ class ContactResponse {
     bool inherits(const Contact& c, Memory& memory) const;
     Touch makeTouch(const Contact& contact) const;
     void add(const Touch& touch);
-    Vec3 carriedOf(const Touch& touch) const;
+    Vec3 carriedOf(int body, const Vec3& arm) const;
+    Vec3 carriedOf(const Touch& touch) const { return carriedOf(touch.contact.body, touch.arm); }
+    void findChords();
     void place(Touch& touch, const Contact& contact) const;
     Vec3 relativeVelocity(const Touch& touch, const IslandVelocities& solved) const;
     double timeOfTouch(const Touch& touch) const;
@@ -290,6 +292,7 @@ class ContactResponse {
     std::vector<Vec6> m_still;                            ///< twists of bodies that do not move
     std::vector<double> m_speeds;                         ///< of each body: see speedsBeside [m/s]
     std::vector<double> m_earliest;                       ///< of each body: see keepEarliest [s]
+    std::vector<Mat3> m_chords;                           ///< of each body: see findChords [1/s]
 };
 
 }  // namespace jacket
