@@ -43,12 +43,40 @@ void CarriedVertices::addTied(ShellBody& shell, int vertex, const Obstacle& obst
 }
 
 void CarriedVertices::move(const btCollisionWorld& world, const Vec3& gravity, double h) {
+    const bool areAllAsleep = m_vertices.empty() && !m_hasMoved;
+    m_hasMoved = !m_vertices.empty();
+    if (areAllAsleep) return;
+    std::erase_if(m_vertices, [&](const Carried& c) { return idOf(world, c.object) != c.objectId; });
+    m_goals.clear();
+    for (const Carried& c : m_vertices) m_goals.push_back(fromBullet(c.object->getWorldTransform()));
+    carry(m_vertices, m_goals, gravity, h);
+    for (std::size_t i = 0; i < m_vertices.size(); ++i) m_vertices[i].end = m_goals[i];
+    std::erase_if(m_moved, [](const Carried& c) { return !c.shell->isAsleep(); });
+    m_moved.insert(m_moved.end(), m_vertices.begin(), m_vertices.end());
+    m_vertices.clear();
+}
+
+void CarriedVertices::moveToStart(const btCollisionWorld& world, Obstacles& obstacles, const Vec3& gravity, double h) {
+    std::erase_if(m_vertices, [](const Carried& c) { return !c.shell->m_hasVelocity; });  // of a solve that is void
+    std::erase_if(m_moved, [&](const Carried& c) {
+        return idOf(world, c.object) != c.objectId || !c.object->isKinematicObject();
+    });
+    const auto isToMove = [](const Carried& c) { return !c.shell->m_hasVelocity && !c.shell->isAsleep(); };
+    const auto others = std::partition(m_moved.begin(), m_moved.end(), isToMove);
+    m_goals.clear();
+    for (auto c = m_moved.begin(); c != others; ++c) m_goals.push_back(obstacles.startOf(*c->object, h));
+    carry({m_moved.begin(), others}, m_goals, gravity, h);
+    m_moved.erase(m_moved.begin(), others);
+}
+
+void CarriedVertices::carry(std::span<const Carried> vertices, std::span<const Frame> goals, const Vec3& gravity,
+                            double h) {
     m_shells.clear();
-    for (const Carried& carried : m_vertices)
+    for (const Carried& carried : vertices)
         if (!carried.shell->isAsleep() && std::find(m_shells.begin(), m_shells.end(), carried.shell) == m_shells.end())
             m_shells.push_back(carried.shell);
     for (ShellBody* body : m_shells) {
-        findShifts(*body, world, h);
+        findShifts(*body, vertices, goals, h);
         Shell& shell = body->m_shell;
         const bool isStiff = shell.isStiff(h);
         if (isStiff) moveAsOne(*body, m_shifts);
@@ -56,16 +84,17 @@ void CarriedVertices::move(const btCollisionWorld& world, const Vec3& gravity, d
         if (!isStiff) spare(*body, gravity, h);
         for (const auto& [carried, by] : m_shifts) shell.displace(carried->vertex, by);
     }
-    m_vertices.clear();
 }
 
-void CarriedVertices::findShifts(const ShellBody& shell, const btCollisionWorld& world, double h) {
+void CarriedVertices::findShifts(const ShellBody& shell, std::span<const Carried> vertices,
+                                 std::span<const Frame> goals, double h) {
     m_shifts.clear();
-    for (const Carried& c : m_vertices) {
-        if (c.shell != &shell || idOf(world, c.object) != c.objectId) continue;
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+        const Carried& c = vertices[i];
+        if (c.shell != &shell) continue;
         const Vec3 assumed = shell.shell().positions().col(c.vertex);
         const Vec3 local = c.anchor ? *c.anchor : c.end.inverse(Eigen::Isometry) * assumed;
-        const Vec3 by = fromBullet(c.object->getWorldTransform()) * local - assumed;
+        const Vec3 by = goals[i] * local - assumed;
         if (by.norm() < kTeleport * h && by.allFinite()) m_shifts.push_back({&c, by});
     }
 }

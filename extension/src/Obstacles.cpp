@@ -4,8 +4,8 @@
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
-#include <LinearMath/btTransformUtil.h>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 
@@ -42,6 +42,30 @@ Mat6 massOf(const btRigidBody& body) {
     return result;
 }
 
+/// Of the ball about a body's origin that holds its shape, or a large one [m].
+double radiusOf(const btCollisionShape& shape) {
+    btVector3 centre;
+    btScalar radius;
+    shape.getBoundingSphere(centre, radius);
+    return std::min(double(radius + centre.length()), 1e6);
+}
+
+/// Of the motion from one pose to another in a time.
+Vec6 twistBetween(const Frame& before, const Frame& now, double time) {
+    const Eigen::AngleAxisd turn(Eigen::Quaterniond(now.linear() * before.linear().transpose()).normalized());
+    Vec6 twist;
+    twist << (now.translation() - before.translation()) / time, turn.angle() / time * turn.axis();
+    return twist;
+}
+
+/// Whether two twists lead a body nearly the same way in a time.
+bool isNearly(const Vec6& a, const Vec6& b, double time) {
+    constexpr double kShare = 1e-3, kTurn = 1e-3;  // of the way, [rad]
+    const Vec6 off = a - b;
+    return off.head<3>().norm() <= kShare * b.head<3>().norm() &&
+           time * off.tail<3>().norm() <= kTurn + kShare * time * b.tail<3>().norm();
+}
+
 /// Radius of a ball that fits into a shape of triangles, for all that is known of it [m].
 double innerRadiusOf(const btConcaveShape& shape) {
     constexpr double kThickness = 0.5;  // of its bounds
@@ -64,10 +88,7 @@ Frame moved(const Frame& start, const Vec6& twist, double time) {
 Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContacts* contacts, bool hasMoved) {
     Obstacle obstacle{&object, &piecesOf(*object.getCollisionShape()), fromBullet(object.getWorldTransform()), {}};
     CoupledBody& coupled = obstacle.body;
-    btVector3 centre;
-    btScalar radius;
-    object.getCollisionShape()->getBoundingSphere(centre, radius);
-    coupled.radius = std::min(double(radius + centre.length()), 1e6);
+    coupled.radius = radiusOf(*object.getCollisionShape());
     coupled.key = &object;
     for (const auto& piece : obstacle.shape->pieces)
         coupled.inner = std::min(coupled.inner, 0.5 * (piece->upper() - piece->lower()).minCoeff());
@@ -102,13 +123,19 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContact
     return obstacle;
 }
 
+Frame Obstacles::startOf(const btCollisionObject& object, double h) {
+    const Vec6 twist = prescribedTwist(object, h, radiusOf(*object.getCollisionShape()));
+    return moved(fromBullet(object.getWorldTransform()), twist, -h);
+}
+
 std::vector<BodySupport>& Obstacles::freeSupports() {
     if (m_supportCount == m_supports.size()) m_supports.emplace_back();
     return m_supports[m_supportCount++];
 }
 
 /// Of a body that its user moves. Bullet's velocity, where it took one from the same poses, is the mean over all
-/// substeps; else the last step's own motion. A jump is no motion.
+/// substeps; else the last step's own motion, also where they are the same but for Bullet's rounding (in single
+/// precision 3e-4 rad). A jump is no motion.
 Vec6 Obstacles::prescribedTwist(const btCollisionObject& object, double h, double radius) {
     const btTransform& now = object.getWorldTransform();
     const auto [entry, fresh] = m_poses.try_emplace(&object, Pose{m_step, now, now});
@@ -117,11 +144,8 @@ Vec6 Obstacles::prescribedTwist(const btCollisionObject& object, double h, doubl
     Vec6 twist = Vec6::Zero();
     const btRigidBody* rigid = btRigidBody::upcast(&object);
     if (rigid && object.isKinematicObject() && object.isActive()) twist = twistOf(*rigid);
-    if (twist.isZero(0.0)) {
-        btVector3 velocity, spin;
-        btTransformUtil::calculateVelocity(pose.before, pose.now, btScalar(h), velocity, spin);
-        twist << fromBullet(velocity), fromBullet(spin);
-    }
+    const Vec6 own = twistBetween(fromBullet(pose.before), fromBullet(pose.now), h);
+    if (twist.isZero(0.0) || isNearly(twist, own, h)) twist = own;
     const double most = std::max(kTeleport, kTeleportRadii * radius / h);
     return twist.head<3>().norm() < most && twist.allFinite() ? twist : Vec6(Vec6::Zero());
 }

@@ -45,6 +45,8 @@ class Obstacles {
     /// has already made, instead of the coming one. Links that are not prescribed get their mass from coupleLinks. What
     /// an obstacle's body rests on is kept here until the next step begins.
     Obstacle make(btCollisionObject& object, double h, const RigidContacts* contacts, bool hasMoved);
+    /// Where a static or kinematic object begins a motion that it has made already, see make().
+    Frame startOf(const btCollisionObject& object, double h);
     /// Shapes without any piece that shells can touch are reported here once, by Bullet's name of the shape.
     std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }
     /// Before anything else in a step: what moves without Bullet's doing is known by its poses at two steps.

@@ -83,6 +83,16 @@ void moveAnew(btCollisionWorld& world, const Obstacle& obstacle, const Vec6& sol
     world.updateSingleAabb(body);
 }
 
+/// Whether shells meet kinematic bodies there and nothing that they could push: their user alone knows how those move.
+bool isLedByUser(const Island& island) {
+    bool isLed = false;
+    for (const Obstacle& obstacle : island.obstacles) {
+        if (!obstacle.object->isStaticOrKinematicObject()) return false;
+        isLed = isLed || obstacle.object->isKinematicObject();
+    }
+    return isLed;
+}
+
 /// The world's gravity, or `last` while that is not finite: no shell could follow it.
 btVector3 usableGravity(const btDynamicsWorld& world, const btVector3& last) {
     const btVector3 gravity = world.getGravity();
@@ -202,7 +212,8 @@ std::vector<std::string> ShellWorld::takeWarnings() {
 
 /// Bullet has just moved the bodies by the velocities that the last solve, and its own contacts, gave them. Here the
 /// shells move along with the velocities of the same solve, so that shells and bodies are drawn at the same instant;
-/// then the next solve looks at this configuration, and its impulses enter Bullet's next solve.
+/// then the next solve looks at this configuration, and its impulses enter Bullet's next solve. Shells among kinematic
+/// bodies have that solve when these have moved.
 void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     if (!(h > btScalar(0) && std::isfinite(h))) return;
     alterBodies(*world, false);
@@ -220,19 +231,23 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     std::pmr::vector<ShellBody*> all(&m_impl->memory);
     for (const auto& shell : m_shells) all.push_back(shell.get());
     FastBodies fast(*world, m_impl->obstacles, all, m_impl->solved, double(h));  // as Bullet has moved them
+    const Vec3 gravity = fromBullet(m_impl->gravity);
+    Sleepers sleepers(*world, m_impl->obstacles, m_shells, m_impl->memory);
+    sleepers.wakeLed(gravity);
     solveNewcomers(*world, double(h));
     moveShells(*world, double(h));
     fast.holdBack();
     m_impl->solved.clear();
-    const Vec3 gravity = fromBullet(m_impl->gravity);
-    Sleepers sleepers(*world, m_impl->obstacles, m_shells, m_impl->memory);
     sleepers.wake(gravity, double(h), std::exchange(m_impl->windChanged, false));
     std::erase_if(all, [](const ShellBody* shell) { return shell->isAsleep(); });
     m_report.awake = static_cast<int>(all.size());
     if (!all.empty())
         for (Island& island : IslandFinder(*world, m_impl->obstacles, all, m_impl->memory).find(double(h), false)) {
             m_impl->checks.look(island);
-            solveIsland(island, double(h));
+            if (isLedByUser(island))
+                for (ShellBody* shell : island.shells) shell->forgetSolvedVelocity();
+            else
+                solveIsland(island, double(h));
         }
     for (const ShellBody* shell : all) m_report.contacts += static_cast<int>(shell->contacts().size());
     countStep();
@@ -270,13 +285,15 @@ void ShellWorld::releaseAnchors(btCollisionWorld& world) {
     }
 }
 
-/// Shells that were added, or given a velocity, since the last step have no solved velocity to move with: they get one
-/// for the motion that the bodies have already made. Bodies that they push in it have gone too far, or not far enough.
+/// Shells that were added, or given a velocity, since the last step, or are led by their user, have no solved velocity
+/// to move with: they get one for the motion that the bodies have already made. Bodies that they push in it have gone
+/// too far, or not far enough.
 void ShellWorld::solveNewcomers(btCollisionWorld& world, double h) {
     std::pmr::vector<ShellBody*> newcomers(&m_impl->memory);
     for (const auto& shell : m_shells)
         if (!shell->m_hasVelocity && !shell->isAsleep()) newcomers.push_back(shell.get());
     if (newcomers.empty()) return;
+    m_impl->carried.moveToStart(world, m_impl->obstacles, fromBullet(m_impl->gravity), h);
     const double fastest = fastestObject(world);
     for (ShellBody* shell : newcomers) {  // Bullet's pairs know nothing of how they move
         updateBounds(*shell, fastest, h);

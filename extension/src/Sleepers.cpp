@@ -90,6 +90,24 @@ void Sleepers::wakeUp(ShellBody& shell) {
     rest.boundsSpeed = boundsSpeed;
 }
 
+void Sleepers::wakeLed(const Vec3& gravity) {
+    for (const auto& shell : m_shells) {
+        if (!shell->m_rest->asleep || !isLed(*shell) || !isDisturbed(*shell, gravity)) continue;
+        wakeUp(*shell);
+        shell->forgetSolvedVelocity();
+    }
+}
+
+/// Whether it lies on kinematic bodies and on nothing that it could push.
+bool Sleepers::isLed(const ShellBody& shell) const {
+    bool isLed = false;
+    for (const auto& support : shell.m_rest->supports) {
+        if (!contains(support) || !support.object->isStaticOrKinematicObject()) return false;
+        isLed = isLed || support.object->isKinematicObject();
+    }
+    return isLed;
+}
+
 void Sleepers::wake(const Vec3& gravity, double h, bool disturbed) {
     for (const auto& shell : m_shells)
         if (shell->m_rest->asleep && (disturbed || isDisturbed(*shell, gravity))) wakeUp(*shell);

@@ -40,6 +40,8 @@ class Sleepers {
   public:
     Sleepers(btCollisionWorld& world, Obstacles& obstacles, std::span<const std::unique_ptr<ShellBody>> shells,
              std::pmr::memory_resource& memory);
+    /// Before shells move: wakes those whose kinematic support has moved, so that they go along with it.
+    void wakeLed(const Vec3& gravity);
     /// Wakes shells whose world has changed. `disturbed`: all of them, since the wind has.
     void wake(const Vec3& gravity, double h, bool disturbed);
     /// After the step: counts how long shells have kept their place, and lets them sleep together with their bodies.
@@ -61,6 +63,7 @@ class Sleepers {
     void followEnergy(const Candidate& candidate, const Vec3& gravity, double h) const;
     void dropRestless(std::span<Candidate> candidates) const;
     bool isDisturbed(const ShellBody& shell, const Vec3& gravity) const;
+    bool isLed(const ShellBody& shell) const;
     void wakeTouched(double h);
     bool touches(const ShellBody& shell, btCollisionObject& object, double h);
     std::pmr::vector<btCollisionObject*> supportsOf(const ShellBody& shell) const;

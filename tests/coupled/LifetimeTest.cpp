@@ -21,11 +21,6 @@ TriangleMesh sheetAt(double side, int cells, double height) {
     return mesh;
 }
 
-void makeKinematic(btRigidBody& body) {
-    body.setCollisionFlags(body.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
-    body.setActivationState(DISABLE_DEACTIVATION);
-}
-
 /// How the body is that a corner of a sheet is tied to.
 class AnchorTo : public ::testing::TestWithParam<const char*> {};
 

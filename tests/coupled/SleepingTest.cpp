@@ -249,7 +249,7 @@ TEST(Sleeping, AMovedPinWakesAHangingSheet) {
 TEST(Sleeping, AKinematicBodyThatComesWakesIt) {
     Scene scene;
     auto& lifter = scene.addSphere(0.1, 0, btVector3(0, btScalar(-0.3), 0));
-    lifter.setCollisionFlags(lifter.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+    makeKinematic(lifter);
     ShellMaterial damped = trampolineCloth();
     damped.massDamping = 5.0;
     auto& sheet = scene.shells->add(squareSheet(0.6, 6), damped);

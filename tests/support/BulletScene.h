@@ -27,6 +27,12 @@ inline void pinBorder(ShellBody& sheet) {
         if (sheet.shell().mesh().isBorderVertex(i)) sheet.pin(i);
 }
 
+/// A body that its user moves from now on, by its pose or its motion state.
+inline void makeKinematic(btRigidBody& body) {
+    body.setCollisionFlags(body.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+    body.setActivationState(DISABLE_DEACTIVATION);
+}
+
 /// Deepest that a vertex, edge midpoint or centroid of the shell stands inside a ball [m].
 inline double penetration(const ShellBody& sheet, const Vec3& centre, double radius) {
     const btVector3 origin{btScalar(centre.x()), btScalar(centre.y()), btScalar(centre.z())};

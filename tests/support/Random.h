@@ -13,7 +13,7 @@ namespace jacket::bullet::testing {
 /// What chance draws from a seed, the same on every machine: for tests over many sizes, poses and worlds.
 class Random {
   public:
-    explicit Random(unsigned seed) : m_engine(seed) {}
+    explicit Random(unsigned series) : m_engine(series) {}
     double between(double low, double high) { return low + (high - low) * (m_engine() / 4294967296.0); }
     double logBetween(double low, double high) { return std::exp(between(std::log(low), std::log(high))); }
     double scale() { return logBetween(1e-3, 1e3); }  // 1 mm .. 1 km

@@ -17,7 +17,7 @@ namespace jacket::bullet::testing {
 /// has. Masses are 0.01 to 100 times the sheet's, speeds up to 12 m/s, steps 1/60 to 1/240 s.
 class RandomWorld {
   public:
-    explicit RandomWorld(unsigned seed) : m_random(seed) {
+    explicit RandomWorld(unsigned series) : m_random(series) {
         m_scene.addFloor();
         addSheet();
         const int count = 1 + m_random.below(4);
