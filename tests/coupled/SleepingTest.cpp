@@ -87,11 +87,11 @@ TEST_P(Drape, FallsAsleep) {
 INSTANTIATE_TEST_SUITE_P(Shapes, Drape, ::testing::Values("box", "sphere", "cylinder", "capsule"));
 
 /// What is at rest but for noise is damped, not what begins to move: when gravity turns, a cloth that hangs over a ball
-/// slides about as far as one that is never damped.
+/// slides about as far as one that is never damped. On average: by its folds one slides 9 cm and another 19.
 TEST(Sleeping, AClothThatHasCalmedDownIsAsFreeAsBefore) {
-    const auto wayAfterTurn = [](double calmFor, bool sleeping) {
+    const auto wayAfterTurn = [](double calmFor, bool sleeping, double aside) {
         Scene scene;
-        scene.addBody(thingToDrape("sphere"), 0.0, btVector3(0, btScalar(-0.32), 0));
+        scene.addBody(thingToDrape("sphere"), 0.0, btVector3(btScalar(aside), btScalar(-0.32), 0));
         const ShellBody& cloth = scene.shells->add(sheetAt(1.0, 10, 0.0), materials::cotton(), {.sleeping = sleeping});
         scene.run(calmFor, kStep);
         const double start = cloth.shell().positions().row(0).mean();
@@ -99,11 +99,14 @@ TEST(Sleeping, AClothThatHasCalmedDownIsAsFreeAsBefore) {
         scene.run(0.5, kStep);
         return cloth.shell().positions().row(0).mean() - start;
     };
-    for (const double calmFor : {3.0, 5.0, 20.0}) {
-        const double way = wayAfterTurn(calmFor, false);
-        EXPECT_GT(way, 0.05);
-        EXPECT_GT(wayAfterTurn(calmFor, true), 0.7 * way);  // folds that lie otherwise make a difference
-    }
+    double free = 0.0, calmed = 0.0;
+    for (const double calmFor : {5.0, 15.0})
+        for (int start = 0; start < 5; ++start) {
+            free += wayAfterTurn(calmFor, false, 1e-6 * start);
+            calmed += wayAfterTurn(calmFor, true, 1e-6 * start);
+        }
+    EXPECT_GT(free, 10 * 0.05);
+    EXPECT_GT(calmed, 0.7 * free) << "of " << free << " m";
 }
 
 /// Sheets that land on a corner fold somewhere, each another way; vertices that friction turns around by turns must not
