@@ -3,14 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <iterator>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <tuple>
 #include <vector>
 
-#include "support/BulletScene.h"
+#include "support/KinematicScenes.h"
 
 namespace jacket::bullet::testing {
 namespace {
@@ -177,80 +176,32 @@ TEST(Kinematic, AnAnchorIsWhereItsBodyIsInEveryStep) {
     }
 }
 
-/// Under a sheet of 0.8 m that is pinned by its border, a body that turns about an axis across it, and rises.
-/// Parameters: shape, cells of the sheet's side.
-class TurningBody : public ::testing::TestWithParam<std::tuple<std::string, int>> {
+/// Under a cloth. Parameters: shape, cells of the cloth's side.
+class KinematicCourse : public ::testing::TestWithParam<std::tuple<std::string, int>> {
   protected:
-    static std::unique_ptr<btCollisionShape> make(const std::string& shape) {
-        if (shape == "capsule") return std::make_unique<btCapsuleShapeX>(btScalar(0.04), btScalar(0.2));
-        if (shape == "box")
-            return std::make_unique<btBoxShape>(btVector3(btScalar(0.1), btScalar(0.05), btScalar(0.1)));
-        return std::make_unique<btCylinderShape>(btVector3(btScalar(0.12), btScalar(0.04), btScalar(0.12)));
-    }
-    /// In 4 s in which the body is led [m].
-    static double deepest(Scene<>& scene, const ShellBody& sheet, btRigidBody& body,
-                          const std::function<btTransform(double)>& poseAt) {
-        double depth = 0.0;
-        for (double t = kStep; t < 4.0; t += kStep) {
-            body.setWorldTransform(poseAt(t));
-            scene.step(kStep);
-            depth = std::max(depth, penetration(sheet, body));
-        }
-        return depth;
-    }
-    /// Of five starts some 10 um apart: in one of twenty a corner comes in for a step.
-    static double medianDepth(const std::function<double(double)>& depthFrom) {
+    /// Deepest that the cloth stands inside, the median of five starts 10 um apart: in some a corner comes in for a
+    /// step. `z`: where the body is beside the course [m].
+    static double medianDepth(const Course& course, double z) {
+        const auto& [name, cells] = GetParam();
+        const auto isMeant = [&](const Pusher& pusher) { return pusher.name == name; };
+        const Pusher& pusher = *std::find_if(std::begin(kPushers), std::end(kPushers), isMeant);
         std::vector<double> depths;
-        for (int start = 0; start < 5; ++start) depths.push_back(depthFrom(1e-5 * start));
+        for (int start = 0; start < 5; ++start)
+            depths.push_back(
+                KinematicScene{materials::cotton(), course, pusher, cells, kStep, {1e-5 * start, 0, z}}.run().deepest);
         std::sort(depths.begin(), depths.end());
         return depths[2];
     }
 };
 
-TEST_P(TurningBody, DoesNotComeThrough) {
-    const auto& [shape, cells] = GetParam();
-    EXPECT_LT(medianDepth([&](double aside) {
-                  Scene<> scene;
-                  scene.addFloor(-0.5);
-                  auto& sheet = scene.shells->add(squareSheet(0.8, cells), materials::cotton());
-                  pinBorder(sheet);
-                  auto& body = scene.addBody(make(shape), 0.0, btVector3(0, btScalar(-0.12), 0));
-                  makeKinematic(body);
-                  return deepest(scene, sheet, body, [&](double t) {  // at up to 0.75 m/s
-                      const btVector3 at(btScalar(0.03 + aside), btScalar(std::min(-0.12 + 0.05 * t, -0.05)),
-                                         btScalar(0.02));
-                      return btTransform(btQuaternion(btVector3(0, 0, 1), btScalar(6.0 * t)), at);
-                  });
-              }),
-              3e-4);
+TEST_P(KinematicCourse, ATurningBodyDoesNotComeThrough) {
+    EXPECT_LT(medianDepth(courses::kSpin, 0.0), 3e-4);
 }
-INSTANTIATE_TEST_SUITE_P(Shapes, TurningBody,
-                         ::testing::Combine(::testing::Values("box", "capsule", "cylinder"), ::testing::Values(5, 12)));
-
-/// A cloth of 0.8 m that hangs over a body, which its user moves to and fro, by 10 cm once a second. Parameters as
-/// above.
-class ShakenBody : public TurningBody {};
-
-TEST_P(ShakenBody, KeepsAClothOff) {
-    const auto& [shape, cells] = GetParam();
-    EXPECT_LT(medianDepth([&](double aside) {
-                  Scene<> scene;
-                  scene.addFloor();
-                  TriangleMesh mesh = squareSheet(0.8, cells);
-                  mesh.positions.row(1).array() += 0.52;
-                  auto& sheet = scene.shells->add(mesh, materials::cotton(), {.friction = 0.5});
-                  auto& body = scene.addBody(make(shape), 0.0, btVector3(0, btScalar(0.4), 0));
-                  makeKinematic(body);
-                  return deepest(scene, sheet, body, [&](double t) {
-                      const double way = t < 1.0 || t > 3.0 ? 0.0 : 0.1 * std::sin(2.0 * std::numbers::pi * (t - 1.0));
-                      return btTransform(btQuaternion::getIdentity(),
-                                         btVector3(btScalar(way + aside), btScalar(0.4), 0));
-                  });
-              }),
-              3e-4);
+TEST_P(KinematicCourse, AShakenBodyKeepsTheClothOff) {
+    EXPECT_LT(medianDepth(courses::kShake, -0.02), 3e-4);
 }
-INSTANTIATE_TEST_SUITE_P(Shapes, ShakenBody,
-                         ::testing::Combine(::testing::Values("box", "capsule", "cylinder"), ::testing::Values(5, 12)));
+INSTANTIATE_TEST_SUITE_P(Shapes, KinematicCourse,
+                         ::testing::Combine(::testing::Values("box", "capsule", "disc"), ::testing::Values(5, 12)));
 
 /// Two kinematic boxes close on the edge of a sheet that lies on a table, then lift it. `squeeze`: how much nearer than
 /// the sheet is thick each of them comes.
