@@ -233,7 +233,8 @@ inline Vec3 totalAngularMomentum(const btCollisionWorld& world, const bullet::Sh
 
 /// Energy of all shells, dynamic bodies and links of multibodies (which count as bodies) [J], at the instant of
 /// totalMomentum: whatever rests has the kinetic energy m (g h)^2 / 2 of the impulse that is to meet the coming
-/// gravity. Heights are measured from the origin.
+/// gravity (but for shells that touch kinematic bodies and nothing that they could push: these wait for the motion).
+/// Heights are measured from the origin.
 struct Energy {
     double kineticOfBodies = 0.0, kineticOfShells = 0.0;
     double potentialOfBodies = 0.0, potentialOfShells = 0.0;
