@@ -10,9 +10,10 @@ namespace jacket {
 namespace {
 
 /// What a body that is moved does by an impulse on a shell [J]. Where it turns, or is round, its surface comes to a
-/// place otherwise than the point of it that is there when the step begins: the shell's velocity tells how.
-double workOfWall(const Vec3& impulse, const Vec3& carried, const Vec3& velocity) {
-    return carried.isZero(0.0) ? 0.0 : std::max({0.0, impulse.dot(carried), impulse.dot(velocity)});
+/// place otherwise than the point of it that is there when the step begins: the shell's velocity beside that tells how.
+double workOfWall(const Vec3& impulse, const Vec3& carried, const Vec3& beside) {
+    if (carried.isZero(0.0)) return 0.0;
+    return std::max(0.0, impulse.dot(carried) + std::max(0.0, impulse.dot(beside)));
 }
 
 }  // namespace
@@ -111,14 +112,12 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
     double fastest2 = 0.0;
     for (const auto& held : system.constraints()) {  // work of pins and bodies that are moved
         if (held.body >= 0) continue;
-        gain -= workOfWall(-unfiltered().col(held.vertex), held.carried, v.col(held.vertex));
+        gain -= workOfWall(-unfiltered().col(held.vertex), held.carried, v.col(held.vertex) - held.carried);
         fastest2 = std::max(fastest2, held.carried.squaredNorm());
     }
     for (const auto& row : system.rows()) {
         if (row.body >= 0) continue;
-        Vec3 velocity = Vec3::Zero();
-        for (int a = 0; a < 3; ++a) velocity += row.weights[a] * v.col(row.vertices[a]);
-        gain -= workOfWall(system.rowImpulse(row, v, u.w), row.carried, velocity);
+        gain -= workOfWall(system.rowImpulse(row, v, u.w), row.carried, system.rowVelocity(row, v, u.w));
         fastest2 = std::max(fastest2, row.carried.squaredNorm());
     }
     // Jammed between walls the work is any number; but what they push cannot be much faster than they are.

@@ -1,6 +1,5 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -127,8 +126,7 @@ void IslandSolver::Impl::makeRigid(const IslandInput& input, Points& velocities,
             spin += mass[i] * r.cross(Vec3(part.col(i)));
         }
         const Vec3 omega = inertia.ldlt().solve(spin);
-        const Mat3 turn = Eigen::AngleAxisd(time * omega.norm(), omega.normalized()).toRotationMatrix();
-        const Mat3 chord = (turn - Mat3::Identity()) / time;
+        const Mat3 chord = chordsOf(omega, time);
         for (int i = 0; i < shell.vertexCount(); ++i) part.col(i) = mean + chord * (shell.positions().col(i) - centre);
     }
 }

@@ -222,8 +222,8 @@ PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, 
     }
     double target2 = tolerance * tolerance * reference;
     if (preconditioner.isComplete()) target2 = std::min(target2, kCompleteTolerance * kCompleteTolerance * rho);
-    if (const double most2 = floorOfReference(input, kMostOfGravity); most2 < target2 && mayFallIn(input))
-        target2 = std::max(most2, kMostDigits * kMostDigits * target2);
+    if (mayFallIn(input))
+        target2 = std::clamp(floorOfReference(input, kMostOfGravity), kMostDigits * kMostDigits * target2, target2);
     if (roughly) target2 = std::max(target2, std::min(kRough * kRough * reference, kShare * kShare * rho));
     const PcgReport solve = pcg.finish(system, preconditioner, target2, 1.0, maxIterations, u);
     ++report.solves;

@@ -64,7 +64,10 @@ void CarriedVertices::moveToStart(const btCollisionWorld& world, Obstacles& obst
     const auto isToMove = [](const Carried& c) { return !c.shell->m_hasVelocity && !c.shell->isAsleep(); };
     const auto others = std::partition(m_moved.begin(), m_moved.end(), isToMove);
     m_goals.clear();
-    for (auto c = m_moved.begin(); c != others; ++c) m_goals.push_back(obstacles.startOf(*c->object, h));
+    for (auto c = m_moved.begin(); c != others; ++c) {
+        const bool isAsBefore = c != m_moved.begin() && std::prev(c)->object == c->object;
+        m_goals.push_back(isAsBefore ? Frame(m_goals.back()) : obstacles.startOf(*c->object, h));
+    }
     carry({m_moved.begin(), others}, m_goals, gravity, h);
     m_moved.erase(m_moved.begin(), others);
 }

@@ -83,6 +83,19 @@ inline bool standsStill(const btCollisionObject& object) {
     return object.isStaticObject() && !object.isKinematicObject();
 }
 
+/// Whether some of the objects are kinematic and the others static: their user alone knows how they move, and no shell
+/// could push them. `objectOf`: the btCollisionObject of an entry.
+template <class Entries, class ObjectOf>
+bool areLedByUser(const Entries& entries, ObjectOf objectOf) {
+    bool isAnyKinematic = false;
+    for (const auto& entry : entries) {
+        const btCollisionObject& object = objectOf(entry);
+        if (!object.isStaticOrKinematicObject()) return false;
+        isAnyKinematic = isAnyKinematic || object.isKinematicObject();
+    }
+    return isAnyKinematic;
+}
+
 /// Pose after moving with a twist for a time: rotation by the exponential of the angular velocity.
 Frame moved(const Frame& start, const Vec6& twist, double time);
 

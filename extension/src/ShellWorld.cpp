@@ -83,16 +83,6 @@ void moveAnew(btCollisionWorld& world, const Obstacle& obstacle, const Vec6& sol
     world.updateSingleAabb(body);
 }
 
-/// Whether shells meet kinematic bodies there and nothing that they could push: their user alone knows how those move.
-bool isLedByUser(const Island& island) {
-    bool isLed = false;
-    for (const Obstacle& obstacle : island.obstacles) {
-        if (!obstacle.object->isStaticOrKinematicObject()) return false;
-        isLed = isLed || obstacle.object->isKinematicObject();
-    }
-    return isLed;
-}
-
 /// The world's gravity, or `last` while that is not finite: no shell could follow it.
 btVector3 usableGravity(const btDynamicsWorld& world, const btVector3& last) {
     const btVector3 gravity = world.getGravity();
@@ -244,7 +234,8 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     if (!all.empty())
         for (Island& island : IslandFinder(*world, m_impl->obstacles, all, m_impl->memory).find(double(h), false)) {
             m_impl->checks.look(island);
-            if (isLedByUser(island))
+            if (areLedByUser(
+                    island.obstacles, [](const Obstacle& o) -> auto& { return *o.object; }))
                 for (ShellBody* shell : island.shells) shell->forgetSolvedVelocity();
             else
                 solveIsland(island, double(h));

@@ -100,12 +100,10 @@ void Sleepers::wakeLed(const Vec3& gravity) {
 
 /// Whether it lies on kinematic bodies and on nothing that it could push.
 bool Sleepers::isLed(const ShellBody& shell) const {
-    bool isLed = false;
-    for (const auto& support : shell.m_rest->supports) {
-        if (!contains(support) || !support.object->isStaticOrKinematicObject()) return false;
-        isLed = isLed || support.object->isKinematicObject();
-    }
-    return isLed;
+    const auto& supports = shell.m_rest->supports;
+    return std::all_of(supports.begin(), supports.end(), [&](const auto& support) { return contains(support); }) &&
+           areLedByUser(
+               supports, [](const auto& support) -> auto& { return *support.object; });
 }
 
 void Sleepers::wake(const Vec3& gravity, double h, bool disturbed) {

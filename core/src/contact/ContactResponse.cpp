@@ -1,6 +1,5 @@
 #include "contact/ContactResponse.h"
 
-#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -109,18 +108,10 @@ Vec3 ContactResponse::carriedOf(int body, const Vec3& arm) const {
     return m_input.bodies[body].freeTwist.head<3>() + m_chords[body] * arm;
 }
 
-/// Of each prescribed body, mean velocity from arm in its rotation by the step's end: (exp(h [w]x) - 1) / h.
 void ContactResponse::findChords() {
-    m_chords.clear();
-    for (const CoupledBody& body : m_input.bodies) {
-        const Vec3 spin = body.freeTwist.tail<3>();
-        const double angle = body.prescribed ? m_input.h * spin.norm() : 0.0;
-        makeRoom(m_chords);
-        m_chords.push_back(Mat3::Zero());
-        if (angle == 0.0) continue;
-        m_chords.back() = Eigen::AngleAxisd(angle, spin.normalized()).toRotationMatrix() - Mat3::Identity();
-        m_chords.back() /= m_input.h;
-    }
+    m_chords.assign(m_input.bodies.size(), Mat3::Zero());
+    for (std::size_t b = 0; b < m_chords.size(); ++b)
+        if (m_input.bodies[b].prescribed) m_chords[b] = chordsOf(m_input.bodies[b].freeTwist.tail<3>(), m_input.h);
 }
 
 ContactResponse::Touch ContactResponse::makeTouch(const Contact& contact) const {

@@ -292,7 +292,7 @@ class ContactResponse {
     std::vector<Vec6> m_still;                            ///< twists of bodies that do not move
     std::vector<double> m_speeds;                         ///< of each body: see speedsBeside [m/s]
     std::vector<double> m_earliest;                       ///< of each body: see keepEarliest [s]
-    std::vector<Mat3> m_chords;                           ///< of each body: see findChords [1/s]
+    std::vector<Mat3> m_chords;                           ///< of each prescribed body: see chordsOf [1/s]
 };
 
 }  // namespace jacket

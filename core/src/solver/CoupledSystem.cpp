@@ -1,5 +1,6 @@
 #include "solver/CoupledSystem.h"
 
+#include <Eigen/Geometry>
 #include <cassert>
 
 #include "solver/CompactShell.h"
@@ -19,6 +20,11 @@ void CoupledVector::resize(int vertices, int bodies) {
 void CompactVector::resize(int vertices, int bodies) {
     s.assign(4 * static_cast<std::size_t>(vertices), 0.0f);
     w.setZero(6, bodies);
+}
+
+Mat3 chordsOf(const Vec3& spin, double time) {
+    const Mat3 turn = Eigen::AngleAxisd(time * spin.norm(), spin.normalized()).toRotationMatrix();
+    return (turn - Mat3::Identity()) / time;
 }
 
 Mat6 pointStiffness(const Mat3& k, const Vec3& armI, const Vec3& armJ) {

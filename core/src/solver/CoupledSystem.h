@@ -63,6 +63,8 @@ struct SoftRow {
 inline Vec3 pointVelocity(const Vec6& twist, const Vec3& arm) {
     return twist.head<3>() + twist.tail<3>().cross(arm);
 }
+/// Mean velocity from arm, in a time, of what turns: along the chord of its way, (exp(time [spin]x) - 1) / time.
+Mat3 chordsOf(const Vec3& spin, double time);
 /// G^T f: impulse and angular impulse of an impulse at the point.
 inline Vec6 pointImpulse(const Vec3& impulse, const Vec3& arm) {
     Vec6 result;
