@@ -186,24 +186,24 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     if (held && m_touches[known].jammed) return false;
     const double lacks = missing(contact, known);
     if (lacks > -slopOf(contact)) return false;
-    if (!contact.isVertex() && !held) {
-        if (isSaidByVertex(contact)) return false;
+    const bool isNewFace = !contact.isVertex() && !held;
+    if (isNewFace && isSaidByVertex(contact)) return false;
+    m_deepestGap = std::min(m_deepestGap, lacks);
+    if (!fresh && !held && m_touches[known].changes >= kMostChanges) return false;
+    if (isNewFace) {
         // Of features that share vertices the deepest comes first, for the others may be cured with it.
-        m_deepestGap = std::min(m_deepestGap, lacks);
         if (!m_onlyStops && liftVertices(contact, -lacks, solved)) return true;
         for (int a = 0; a < 3; ++a)
             if (contact.weights[a] > 0.0 && m_claimed.count(globalVertex(contact, a))) return true;
         for (int a = 0; a < 3; ++a)
             if (contact.weights[a] > 0.0) m_claimed.insert(globalVertex(contact, a));
     }
-    m_deepestGap = std::min(m_deepestGap, lacks);
     if (fresh) {
         m_index[keyOf(contact)] = static_cast<int>(m_touches.size());
         add(makeTouch(contact));
     }
     Touch& touch = fresh ? m_touches.back() : m_touches[known];
     if (!touch.active) {
-        if (touch.changes >= kMostChanges) return false;
         touch.active = true;
         ++touch.changes;
         if (contact.isVertex()) putDown(contact);
