@@ -244,11 +244,13 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
         std::vector<TrianglePoint> touched;
         for (int t = begin; t < end; ++t) {
             Mat3 triangle;
-            std::array<ShellEdge, 3> edges;
+            std::array<ShellEdge, 3> edges{ShellEdge::kLeftOut, ShellEdge::kLeftOut, ShellEdge::kLeftOut};
             for (int a = 0; a < 3; ++a) {
                 triangle.col(a) = x.col(mesh.triangles()(a, t));
                 const int twin = mesh.twin(3 * t + a);  // its triangle asks about the edge if it comes first
-                edges[a] = twin < 0 ? ShellEdge::kBorder : twin < 3 * t + a ? ShellEdge::kShared : ShellEdge::kLeftOut;
+                if (twin < 0) edges[a] = ShellEdge::kBorder;
+                if (twin >= 0 && twin < 3 * t + a)
+                    edges[a] = {ShellEdge::kShared, x.col(mesh.triangles()((twin + 2) % 3, twin / 3))};
             }
             touched.clear();
             patch->touch(triangle, edges, faceReach, depth, touched);

@@ -13,7 +13,7 @@ constexpr double kAtVertex = 0.9;   // weight of a corner beyond which a triangl
 constexpr double kShallow = 0.5;    // of the body: what goes in less than that is found at the end of the step
 constexpr double kSameTime = 0.02;  // of the step: a triangle that is hit so little before its corners needs no contact
 
-constexpr std::array<ShellEdge, 3> kAllEdges{ShellEdge::kBorder, ShellEdge::kBorder, ShellEdge::kBorder};
+const std::array<ShellEdge, 3> kAllEdges{ShellEdge::kBorder, ShellEdge::kBorder, ShellEdge::kBorder};
 
 Mat3 transformed(const Frame& frame, const Mat3& triangle) {
     return (frame.linear() * triangle).colwise() + frame.translation();

@@ -16,7 +16,8 @@ namespace {
 
 constexpr double kFlat = 1e-4;      // sine of the bend below which an edge is no ridge
 constexpr double kParallel = 0.02;  // sine of the angle below which two edges do not cross
-constexpr double kAcross = 0.5;     // cosine of the angle to a triangle's normal beyond which its edges are not pushed
+constexpr double kAcross = 0.5;     // cosine of the angle to a fold's normal, beyond which it is pushed along it
+constexpr double kSteep = 0.87;     // sine of the angle to a triangle beyond which its edges are not pushed into it
 constexpr double kCone = 1e-6;      // how far, relative, a neighbour may stand out over a tip or a ridge
 
 bool mirrors(const btVector3& scaling) {
@@ -298,8 +299,23 @@ std::optional<TrianglePoint> TrianglePatch::touchTip(int index, const FaceQuery&
     return TrianglePoint{{tip.point, n, n.dot(b.point - tip.point)}, b.weights};
 }
 
+/// Whether to push an edge of a triangle in a direction across it would be to push it along its sheet: one of the two
+/// triangles there goes on against it, steeply, and it does not lead off their fold either.
+bool TrianglePatch::isIntoSheet(const Vec3& direction, const ShellEdge& edge, const FaceQuery& query, int side) {
+    const Vec3 start = query.triangle.col(side), along = query.triangle.col((side + 1) % 3) - start;
+    const auto goesAgainst = [&](const Vec3& third) {
+        const Vec3 way = third - start, inward = way - way.dot(along) / along.squaredNorm() * along;
+        return direction.dot(inward) < -kSteep * inward.norm();
+    };
+    const bool isShared = edge.kind == ShellEdge::kShared;
+    if (!goesAgainst(query.triangle.col((side + 2) % 3)) && !(isShared && goesAgainst(edge.beyond))) return false;
+    if (!isShared) return true;
+    const Vec3 fold = query.normal + unitOr((edge.beyond - start).cross(along), Vec3::Zero());
+    return std::abs(direction.dot(fold)) < kAcross * fold.norm();
+}
+
 std::optional<TrianglePoint> TrianglePatch::touchRidge(const Ridge& ridge, const FaceQuery& query, int side,
-                                                       ShellEdge edge) const {
+                                                       const ShellEdge& edge) const {
     const int next = (side + 1) % 3;
     const Vec3 start = query.triangle.col(side), along = query.triangle.col(next) - start;
     Vec3 n = along.cross(ridge.along);
@@ -307,8 +323,7 @@ std::optional<TrianglePoint> TrianglePatch::touchRidge(const Ridge& ridge, const
     if (!(std::abs(length) > kParallel * along.norm() * ridge.along.norm())) return std::nullopt;
     n /= length;
     if (n.dot(ridge.inward[0]) > kCone || n.dot(ridge.inward[1]) > kCone) return std::nullopt;
-    const bool isInto = edge == ShellEdge::kBorder && n.dot(query.triangle.col((side + 2) % 3) - start) > 0;
-    if (!isInto && std::abs(n.dot(query.normal)) < kAcross) return std::nullopt;
+    if (isIntoSheet(n, edge, query, side)) return std::nullopt;
     const double distance = n.dot(start - ridge.start);  // of the two lines
     if (!query.isNear(distance)) return std::nullopt;
     const auto [s, t] = closestOfSegments(start, start + along, ridge.start, ridge.start + ridge.along);
@@ -332,7 +347,7 @@ void TrianglePatch::touch(const Mat3& triangle, const std::array<ShellEdge, 3>& 
                       [&](int index) {
                           const Ridge& ridge = m_ridges[index];
                           for (int side = 0; side < 3; ++side)
-                              if (edges[side] != ShellEdge::kLeftOut)
+                              if (edges[side].kind != ShellEdge::kLeftOut)
                                   offer(side, touchRidge(ridge, query, side, edges[side]));
                           for (const int tip : ridge.tips)
                               if (tip >= 0) offer(3, touchTip(tip, query));

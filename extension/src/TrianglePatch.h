@@ -12,8 +12,13 @@ class btConcaveShape;
 namespace jacket::bullet {
 
 /// How the edge of a shell's triangle is asked about: two triangles share each, and one of them is enough. What two
-/// triangles share is pushed across them; a border also into its triangle.
-enum class ShellEdge { kLeftOut, kShared, kBorder };
+/// triangles share is pushed across one of them, or across their fold; a border also into its triangle.
+struct ShellEdge {
+    enum Kind { kLeftOut, kShared, kBorder };
+    Kind kind;
+    Vec3 beyond;  ///< third corner of the triangle that shares the edge
+    ShellEdge(Kind asked, const Vec3& third = Vec3::Zero()) : kind(asked), beyond(third) {}
+};
 
 /// The triangles of a concave shape that lie near a shell, in the shape's frame.
 ///
@@ -85,8 +90,10 @@ class TrianglePatch {
         double reach, depth;
         bool isNear(double distance) const { return distance <= reach && distance >= -depth; }
     };
+    static bool isIntoSheet(const Vec3& direction, const ShellEdge& edge, const FaceQuery& query, int side);
     std::optional<TrianglePoint> touchTip(int corner, const FaceQuery& query) const;
-    std::optional<TrianglePoint> touchRidge(const Ridge& ridge, const FaceQuery& query, int side, ShellEdge edge) const;
+    std::optional<TrianglePoint> touchRidge(const Ridge& ridge, const FaceQuery& query, int side,
+                                            const ShellEdge& edge) const;
 
     Bounds m_box;
     std::vector<Corner> m_corners;

@@ -201,7 +201,8 @@ TEST_P(KinematicCourse, AShakenBodyKeepsTheClothOff) {
     EXPECT_LT(medianDepth(courses::kShake, -0.02), 3e-4);
 }
 INSTANTIATE_TEST_SUITE_P(Shapes, KinematicCourse,
-                         ::testing::Combine(::testing::Values("box", "capsule", "disc"), ::testing::Values(5, 12)));
+                         ::testing::Combine(::testing::Values("box", "mesh", "capsule", "disc"),
+                                            ::testing::Values(5, 12)));
 
 /// Two kinematic boxes close on the edge of a sheet that lies on a table, then lift it. `squeeze`: how much nearer than
 /// the sheet is thick each of them comes.

@@ -18,9 +18,9 @@ namespace jacket::bullet {
 namespace {
 
 using testing::Random;
-using enum ShellEdge;
+using enum ShellEdge::Kind;
 
-constexpr std::array kBorders{kBorder, kBorder, kBorder};
+const std::array<ShellEdge, 3> kBorders{kBorder, kBorder, kBorder};
 
 constexpr double kAccuracy = sizeof(btScalar) == sizeof(float) ? 1e-6 : 1e-12;
 
@@ -185,12 +185,31 @@ TEST(TrianglePatch, SharedEdgesAreNotPushedAlongTheirSheet) {
     EXPECT_NEAR(touched[0].surface.normal.y(), 0, 1e-9);
     EXPECT_NEAR(touched[0].surface.distance, -0.1 * std::sqrt(2), 1e-6);
     touched.clear();
-    patch.touch(triangle, {kShared, kLeftOut, kLeftOut}, 0, 0.5, touched);
+    const ShellEdge shared(kShared, {-2, -0.8, -2});
+    patch.touch(triangle, {shared, kLeftOut, kLeftOut}, 0, 0.5, touched);
     EXPECT_TRUE(touched.empty());
-    patch.touch(triangle, {kShared, kLeftOut, kLeftOut}, 0, 2, touched);
+    patch.touch(triangle, {shared, kLeftOut, kLeftOut}, 0, 2, touched);
     ASSERT_EQ(touched.size(), 1u);
     EXPECT_NEAR(touched[0].surface.normal.y(), 1, 1e-9);
     EXPECT_NEAR(touched[0].surface.distance, -0.8, 1e-6);
+}
+
+/// An edge along which a sheet is folded lies over a ridge; each of its triangles slopes away steeply.
+TEST(TrianglePatch, FoldedEdgesArePushedOutOfTheirFold) {
+    Soup soup;  // the ridge is the z axis, below it and x > 0 is inside
+    const Vec3 a(0, 0, -2), b(0, 0, 2);
+    soup.add(a, b, {9, 0, 0});
+    soup.add(a, {0, -9, 0}, b);
+    const TrianglePatch patch = soup.patch(20);
+    const Vec3 start(1, 0.8, 0), end(-0.8, -1, 0), out = Vec3(-1, 1, 0).normalized();
+    const auto tip = [&](double side) -> Vec3 { return 0.5 * (start + end) + Vec3(0, 0, side) - 2 * out; };
+    Mat3 triangle;
+    triangle << start, end, tip(1);
+    std::vector<TrianglePoint> touched;
+    patch.touch(triangle, {ShellEdge(kShared, tip(-1)), kLeftOut, kLeftOut}, 0, 0.5, touched);
+    ASSERT_EQ(touched.size(), 1u);
+    EXPECT_NEAR(touched[0].surface.distance, -0.1 * std::sqrt(2), 1e-6);
+    EXPECT_NEAR(touched[0].surface.normal.dot(out), 1, 1e-6);
 }
 
 TEST(TrianglePatch, AFlatFloorHasNothingForFacesAndOneNormalForPoints) {

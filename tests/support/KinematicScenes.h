@@ -5,24 +5,33 @@
 #include <numbers>
 
 #include "support/BulletScene.h"
+#include "support/Target.h"
 
 /// Bodies that their user moves against a sheet of 80 cm for 4 s, starting and stopping at once: tests run some of them
 /// from a few starts, kinematic_bench all.
 namespace jacket::bullet::testing {
 
+inline std::unique_ptr<btCollisionShape> makeBlock() {
+    return std::make_unique<btBoxShape>(btVector3(btScalar(0.1), btScalar(0.05), btScalar(0.1)));
+}
+/// The same as triangles.
+inline std::unique_ptr<btCollisionShape> makeBlockMesh() {
+    static const auto mesh = boxMesh(btVector3(btScalar(0.1), btScalar(0.05), btScalar(0.1)));
+    return std::make_unique<btBvhTriangleMeshShape>(mesh.get(), true);
+}
+
 struct Pusher {
     const char* name;
     double halfHeight;  ///< [m]
     std::unique_ptr<btCollisionShape> (*make)();
+    std::unique_ptr<btCollisionShape> (*surface)() = make;  ///< by which depth is measured
 };
 
 inline constexpr Pusher kPushers[] = {
     {"ball", 0.08,
      []() -> std::unique_ptr<btCollisionShape> { return std::make_unique<btSphereShape>(btScalar(0.08)); }},
-    {"box", 0.05,
-     []() -> std::unique_ptr<btCollisionShape> {
-         return std::make_unique<btBoxShape>(btVector3(btScalar(0.1), btScalar(0.05), btScalar(0.1)));
-     }},
+    {"box", 0.05, makeBlock},
+    {"mesh", 0.05, makeBlockMesh, makeBlock},
     {"capsule", 0.04,
      []() -> std::unique_ptr<btCollisionShape> {
          return std::make_unique<btCapsuleShapeX>(btScalar(0.04), btScalar(0.2));
@@ -105,12 +114,13 @@ struct KinematicScene {
         if (course.isPinned) pinBorder(sheet);
         auto& body = scene.addBody(pusher.make(), 0.0, pose(0.0).getOrigin());
         makeKinematic(body);
+        const auto surface = pusher.surface();
         Outcome outcome;
         for (double t = h; t < kSeconds; t += h) {
             body.setWorldTransform(pose(t));
             scene.step(h);
-            outcome.deepest =
-                std::max({outcome.deepest, penetration(sheet, body), -sheet.shell().positions().row(1).minCoeff()});
+            outcome.deepest = std::max({outcome.deepest, penetration(sheet, *surface, body.getWorldTransform()),
+                                        -sheet.shell().positions().row(1).minCoeff()});
             outcome.fastest = std::max(outcome.fastest, sheet.shell().velocities().colwise().norm().maxCoeff());
             outcome.unsettled += scene.shells->lastStep().settled ? 0 : 1;
         }
