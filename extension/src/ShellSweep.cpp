@@ -10,7 +10,7 @@ namespace {
 constexpr int kMostAdvances = 60;   // of one triangle towards one piece; then the contact is taken where it is
 constexpr double kTouching = 0.3;   // of the contact thickness: closer than this they touch
 constexpr double kAtVertex = 0.9;   // weight of a corner beyond which a triangle's contact is that corner's
-constexpr double kShallow = 0.5;    // of the body: what goes in less than that is found at the end of the step
+constexpr double kShallow = 0.5;    // of the body: see Sweep::shallow
 constexpr double kSameTime = 0.02;  // of the step: a triangle that is hit so little before its corners needs no contact
 
 const std::array<ShellEdge, 3> kAllEdges{ShellEdge::kBorder, ShellEdge::kBorder, ShellEdge::kBorder};
@@ -115,7 +115,13 @@ struct ShellContacts::Sweep {
     double closingSpeed(const SweepTarget& target, const std::array<int, 3>& corners, const Vec3& centre,
                         const Mat3& triangle, const Vec3& normal) const;
     std::optional<Contact> advance(const SweepTarget& target, const std::array<int, 3>& corners) const;
-    std::optional<Contact> contactAt(double t, const TrianglePoint& touch, const std::array<int, 3>& corners) const;
+    struct Touch {
+        Contact contact;
+        double approach;  ///< [m/s]
+    };
+    Touch touchAt(double t, const TrianglePoint& touch, const std::array<int, 3>& corners) const;
+    /// What goes in by less than this is found at the end of the step [m].
+    double shallow() const { return kShallow * obstacle.body.inner; }
 };
 
 /// How fast any of the corners may come nearer to the target, but for the body's spin [m/s].
@@ -130,12 +136,14 @@ double ShellContacts::Sweep::closingSpeed(const SweepTarget& target, const std::
 }
 
 /// Conservative advancement (Mirtich 1996): as far in time as the distance allows at the largest closing speed, again
-/// and again, until they touch or the step is over. For a vertex all corners are the same.
+/// and again, until they touch or the step is over. For a vertex all corners are the same. What touches without closing
+/// in by much goes on until it is deep: a triangle that tilts may yet let pass what its middle keeps up with.
 std::optional<Contact> ShellContacts::Sweep::advance(const SweepTarget& target,
                                                      const std::array<int, 3>& corners) const {
     const double thickness = shell.contactThickness(), spin = twist.tail<3>().norm() * obstacle.body.radius;
     const bool isPoint = corners[0] == corners[1];
-    double t = 0.0;
+    double t = 0.0, sought = kTouching * thickness;
+    int most = kMostAdvances;
     for (int i = 0;; ++i) {
         const Frame frame = moved(bodyStart, twist, t);
         const Mat3 triangle = triangleAt(corners, t);
@@ -144,17 +152,23 @@ std::optional<Contact> ShellContacts::Sweep::advance(const SweepTarget& target,
         if (i == 0 && touch->surface.distance < 0.0) return std::nullopt;  // there from the start: not of this motion
         const double closing =
             closingSpeed(target, corners, frame.translation(), triangle, frame.linear() * touch->surface.normal);
-        const double left = touch->surface.distance - kTouching * thickness;
-        if (left <= 1e-3 * thickness || i == kMostAdvances) return contactAt(t, *touch, corners);
+        double left = touch->surface.distance - sought;
+        if (left <= 1e-3 * thickness || i >= most) {
+            const Touch found = touchAt(t, *touch, corners);
+            if (found.approach * (time - t) >= shallow() || sought < 0.0) return found.contact;
+            sought = -shallow();
+            most += kMostAdvances;
+            left = touch->surface.distance - sought;
+        }
         if (closing + spin <= 0.0) return std::nullopt;
         t += std::max(left, 1e-2 * thickness) / (closing + spin);
         if (t >= time) return std::nullopt;
     }
 }
 
-/// None if it is so shallow at the end of the step that it will be found there.
-std::optional<Contact> ShellContacts::Sweep::contactAt(double t, const TrianglePoint& touch,
-                                                       const std::array<int, 3>& corners) const {
+/// A contact at a time, as if the motion had come to it straight.
+ShellContacts::Sweep::Touch ShellContacts::Sweep::touchAt(double t, const TrianglePoint& touch,
+                                                          const std::array<int, 3>& corners) const {
     const Frame frame = moved(bodyStart, twist, t);
     const Mat3 triangle = triangleAt(corners, t);
     Contact contact;
@@ -167,9 +181,8 @@ std::optional<Contact> ShellContacts::Sweep::contactAt(double t, const TriangleP
     for (int a = 0; a < 3; ++a)
         relative += touch.weights[a] * relativeVelocity(corners[a], frame.translation(), triangle.col(a));
     const double approach = -contact.normal.dot(relative);
-    if ((time - t) * approach < kShallow * obstacle.body.inner) return std::nullopt;
     contact.gap = t * approach + touch.surface.distance - shell.contactThickness();
-    return contact;
+    return {contact, approach};
 }
 
 /// All vertices are swept against what stands or is led: a sheet that lies flat on it at the end of the step is held by
