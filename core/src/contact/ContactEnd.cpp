@@ -259,12 +259,16 @@ void ContactResponse::putDown(const Contact& contact) {
 }
 
 /// Whether a contact has come into the body where it is nearest to the surface at the end. What has gone deep may be
-/// nearer to another side: beyond the middle of the body, or beside its edge.
+/// nearer to another side: beyond the middle of the body, or beside its edge. It came in through the side that it
+/// crossed last, being inside of the others by then.
 bool ContactResponse::entersThere(const Contact& contact, const Touch& touch, const IslandVelocities& solved) const {
     const double along = contact.normal.dot(touch.contact.normal);
     if (along < 0.0) return false;
-    const double before = contact.gap - m_input.h * relativeVelocity(touch, solved).dot(contact.normal);
-    return along > kSameWay || !contact.isVertex() || before > -10.0 * m_vertexSlop;
+    if (along > kSameWay || !contact.isVertex()) return true;
+    const Vec3 way = m_input.h * relativeVelocity(touch, solved);
+    const auto timeOf = [](double gap, double change) { return gap > 0.0 && gap < -change ? gap / -change : 0.0; };
+    const double here = way.dot(contact.normal), room = -m_input.h * touch.target;
+    return timeOf(contact.gap - here, here) > timeOf(room, way.dot(touch.contact.normal));
 }
 
 /// Vertices that lie on a curved surface, or close above it, leave their chords inside it. They are lifted by as much,
