@@ -125,6 +125,24 @@ TEST(ShellDynamicsWorld, DrawsAheadWithoutLatency) {
     EXPECT_THROW(scene.world.renderPositions(sheet, drawn), std::invalid_argument);
 }
 
+/// A shell that is made when another has left, often where that was in memory, stood nowhere a substep ago: one of as
+/// many vertices, and one of more.
+TEST(ShellDynamicsWorld, DrawsAShellThatHasJustComeWhereItStands) {
+    for (const int cells : {2, 40}) {
+        InterpolatingScene scene;
+        auto& shells = scene.world.shells();
+        auto& other = shells.add(squareSheet(1, 2), trampolineCloth());
+        scene.world.stepSimulation(btScalar(1.25 / 64), 4, btScalar(1.0 / 64));
+        shells.remove(other);
+        TriangleMesh mesh = squareSheet(3, cells);
+        mesh.positions.row(1).array() += 5.0;
+        auto& sheet = shells.add(mesh, trampolineCloth());
+        std::vector<btVector3> drawn(sheet.vertexCount());
+        scene.world.renderPositions(sheet, drawn);
+        for (int i = 0; i < sheet.vertexCount(); ++i) ASSERT_EQ(drawn[i], sheet.positions()[i]) << cells << " cells";
+    }
+}
+
 /// The motion state of a body and the shell that fell beside it are drawn at one height.
 TEST(ShellDynamicsWorld, DrawsShellsAndMotionStatesAtTheSameTime) {
     InterpolatingScene scene;

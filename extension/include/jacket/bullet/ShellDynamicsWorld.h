@@ -24,15 +24,15 @@ class ShellDynamicsWorld : public Base {
     const ShellWorld& shells() const { return m_shells; }
 
     /// Vertices of a shell at the time for which Bullet's motion states give the bodies' poses [m]: between the last
-    /// two substeps, or ahead of the last one if setLatencyMotionStateInterpolation(false). Throws
-    /// std::invalid_argument unless `positions` has the shell's size.
+    /// two substeps, or ahead of the last one if setLatencyMotionStateInterpolation(false). A shell that has been added
+    /// since the last substep is where it stands. Throws std::invalid_argument unless `positions` has the shell's size.
     void renderPositions(const ShellBody& shell, std::span<btVector3> positions) const {
         const auto now = shell.positions();
         if (positions.size() != now.size())
             throw std::invalid_argument("ShellDynamicsWorld::renderPositions: the span must have the shell's size");
         const btScalar step = this->m_fixedTimeStep;
-        const auto before =
-            std::find_if(m_before.begin(), m_before.end(), [&](const auto& entry) { return entry.first == &shell; });
+        const auto before = std::find_if(m_before.begin(), m_before.end(),
+                                         [&](const auto& entry) { return entry.first == &shell.collisionObject(); });
         if (this->m_latencyMotionStateInterpolation && before == m_before.end()) {
             std::copy(now.begin(), now.end(), positions.begin());
         } else if (this->m_latencyMotionStateInterpolation) {
@@ -47,6 +47,11 @@ class ShellDynamicsWorld : public Base {
     void removeRigidBody(btRigidBody* body) override {
         std::erase_if(m_motions, [&](const Motion& motion) { return motion.body == body; });
         Base::removeRigidBody(body);
+    }
+
+    void removeCollisionObject(btCollisionObject* object) override {
+        std::erase_if(m_before, [&](const auto& entry) { return entry.first == object; });  // another may get its place
+        Base::removeCollisionObject(object);
     }
 
   protected:
@@ -69,7 +74,7 @@ class ShellDynamicsWorld : public Base {
         m_before.resize(m_shells.size());
         for (int i = 0; i < m_shells.size(); ++i) {
             const auto now = m_shells[i].positions();
-            m_before[i].first = &m_shells[i];
+            m_before[i].first = &m_shells[i].collisionObject();
             m_before[i].second.assign(now.begin(), now.end());
         }
         Base::internalSingleStepSimulation(h);
@@ -88,8 +93,8 @@ class ShellDynamicsWorld : public Base {
     };
     std::vector<Motion> m_motions;
     btScalar m_span = 0, m_elapsed = 0;
-    std::vector<std::pair<const ShellBody*, std::vector<btVector3>>> m_before;  ///< positions a substep ago
-    ShellWorld m_shells{*this};                                                 ///< last, as it leaves the world first
+    std::vector<std::pair<const btCollisionObject*, std::vector<btVector3>>> m_before;  ///< positions a substep ago
+    ShellWorld m_shells{*this};  ///< last, as it leaves the world first
 };
 
 }  // namespace jacket::bullet
