@@ -10,8 +10,6 @@
 namespace jacket::bullet {
 namespace {
 
-constexpr double kTeleport = 50.0;  // a body that strays faster than this from what was solved was teleported [m/s]
-
 /// Velocity of a point at `arm` per unit of linear and angular velocity.
 Eigen::Matrix<double, 3, 6> motionOf(const Vec3& arm) {
     Eigen::Matrix<double, 3, 6> rows;
@@ -72,6 +70,11 @@ void CarriedVertices::moveToStart(const btCollisionWorld& world, Obstacles& obst
     m_moved.erase(m_moved.begin(), others);
 }
 
+void CarriedVertices::forget(const ShellBody& shell) {
+    for (auto* vertices : {&m_vertices, &m_moved})
+        std::erase_if(*vertices, [&](const Carried& c) { return c.shell == &shell; });
+}
+
 void CarriedVertices::carry(std::span<const Carried> vertices, std::span<const Frame> goals, const Vec3& gravity,
                             double h) {
     m_shells.clear();
@@ -98,7 +101,7 @@ void CarriedVertices::findShifts(const ShellBody& shell, std::span<const Carried
         const Vec3 assumed = shell.shell().positions().col(c.vertex);
         const Vec3 local = c.anchor ? *c.anchor : c.end.inverse(Eigen::Isometry) * assumed;
         const Vec3 by = goals[i] * local - assumed;
-        if (by.norm() < kTeleport * h && by.allFinite()) m_shifts.push_back({&c, by});
+        if (by.norm() < kTeleportSpeed * h && by.allFinite()) m_shifts.push_back({&c, by});
     }
 }
 

@@ -22,6 +22,7 @@ class CarriedVertices {
     /// bodies begin it, should that not be where they were. (Bullet takes one to the end of all substeps in the first
     /// of them, with the velocity that takes it there in all.)
     void moveToStart(const btCollisionWorld& world, Obstacles& obstacles, const Vec3& gravity, double h);
+    void forget(const ShellBody& shell);
     void clear() {
         m_vertices.clear();
         m_moved.clear();

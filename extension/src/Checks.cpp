@@ -70,6 +70,11 @@ void ShellChecks::lookAtGravity(const btVector3& gravity) {
     m_warnings.push_back("shells keep the last finite gravity while the world's is not finite");
 }
 
+void ShellChecks::noteLetGo(const ShellBody& shell, int anchors) {
+    m_warnings.push_back(nameOf(shell) + " was let go of at " + std::to_string(anchors) +
+                         (anchors == 1 ? " vertex" : " vertices") + " by a body that was teleported without it");
+}
+
 void ShellChecks::look(const Island& island) {
     for (const ShellBody* shell : island.shells) known(*shell);
     for (const auto& [index, body] : island.pairs) {

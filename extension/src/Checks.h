@@ -19,6 +19,7 @@ const char* defectOf(const btCollisionObject& object);
 class ShellChecks {
   public:
     void look(const Island& island);
+    void noteLetGo(const ShellBody& shell, int anchors);
     void lookAtGravity(const btVector3& gravity);
     void forget(const ShellBody& shell) { m_known.erase(&shell); }
     std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }

@@ -13,13 +13,11 @@
 #include "CoupledLinks.h"
 #include "RigidContacts.h"
 #include "jacket/Types.h"
+#include "jacket/bullet/ShellWorld.h"
 
 namespace jacket::bullet {
 namespace {
 
-// A body that its user moves faster than this and farther than so many times its size in a step has been teleported.
-constexpr double kTeleport = 50.0;  // [m/s]
-constexpr double kTeleportRadii = 4.0;
 // A direction in which Bullet does not let a body move takes part with this many times its mass.
 constexpr double kLocked = 1e8;
 
@@ -76,6 +74,11 @@ double innerRadiusOf(const btConcaveShape& shape) {
 
 }  // namespace
 
+bool isTeleport(const btCollisionObject& body, double way, double time) {
+    constexpr double kRadii = 4.0;
+    return way > kTeleportSpeed * time && way > kRadii * radiusOf(*body.getCollisionShape());
+}
+
 Frame moved(const Frame& start, const Vec6& twist, double time) {
     Frame frame = start;
     frame.translation() += time * twist.head<3>();
@@ -102,7 +105,7 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContact
         if (hasMoved) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
     } else if (!rigid || object.isStaticOrKinematicObject()) {
         coupled.prescribed = true;
-        coupled.freeTwist = prescribedTwist(object, h, coupled.radius);
+        coupled.freeTwist = prescribedTwist(object, h);
         if (hasMoved) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
     } else {
         const bool moves = rigid->isActive() && rigid->getInvMass() != btScalar(0);
@@ -124,8 +127,11 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContact
 }
 
 Frame Obstacles::startOf(const btCollisionObject& object, double h) {
-    const Vec6 twist = prescribedTwist(object, h, radiusOf(*object.getCollisionShape()));
-    return moved(fromBullet(object.getWorldTransform()), twist, -h);
+    const Frame now = fromBullet(object.getWorldTransform());
+    if (const auto* link = btMultiBodyLinkCollider::upcast(&object)) return moved(now, twistOf(*link), -h);
+    const btRigidBody* rigid = btRigidBody::upcast(&object);
+    const bool isFree = rigid && !object.isStaticOrKinematicObject();
+    return moved(now, isFree ? twistOf(*rigid) : prescribedTwist(object, h), -h);
 }
 
 std::vector<BodySupport>& Obstacles::freeSupports() {
@@ -135,19 +141,22 @@ std::vector<BodySupport>& Obstacles::freeSupports() {
 
 /// Of a body that its user moves. Bullet's velocity, where it took one from the same poses, is the mean over all
 /// substeps; else the last step's own motion, also where they are the same but for Bullet's rounding (in single
-/// precision 3e-4 rad). A jump is no motion.
-Vec6 Obstacles::prescribedTwist(const btCollisionObject& object, double h, double radius) {
+/// precision 3e-4 rad). A jump is no motion, neither in its step nor in the substeps after it.
+Vec6 Obstacles::prescribedTwist(const btCollisionObject& object, double h) {
     const btTransform& now = object.getWorldTransform();
     const auto [entry, fresh] = m_poses.try_emplace(&object, Pose{m_step, now, now});
     Pose& pose = entry->second;
-    if (!fresh && pose.step != m_step) pose = {m_step, now, pose.step == m_step - 1 ? pose.now : now};
-    Vec6 twist = Vec6::Zero();
+    if (!fresh && pose.step != m_step) pose = {m_step, now, pose.step == m_step - 1 ? pose.now : now, pose.ofTeleport};
+    Vec6 given = Vec6::Zero();
     const btRigidBody* rigid = btRigidBody::upcast(&object);
-    if (rigid && object.isKinematicObject() && object.isActive()) twist = twistOf(*rigid);
+    if (rigid && object.isKinematicObject() && object.isActive()) given = twistOf(*rigid);
     const Vec6 own = twistBetween(fromBullet(pose.before), fromBullet(pose.now), h);
-    if (twist.isZero(0.0) || isNearly(twist, own, h)) twist = own;
-    const double most = std::max(kTeleport, kTeleportRadii * radius / h);
-    return twist.head<3>().norm() < most && twist.allFinite() ? twist : Vec6(Vec6::Zero());
+    const bool isOwn = given.isZero(0.0) || given == pose.ofTeleport || isNearly(given, own, h);
+    const Vec6& twist = isOwn ? own : given;
+    const double speed = twist.head<3>().norm(), way = h * std::max(speed, own.head<3>().norm());
+    if (twist.allFinite() && !isTeleport(object, way, way / speed)) return twist;
+    pose.ofTeleport = given;
+    return Vec6::Zero();
 }
 
 bool Obstacles::isUsable(const btCollisionObject& object) {

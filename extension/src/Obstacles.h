@@ -21,6 +21,10 @@ class RigidContacts;
 /// is by itself.
 inline constexpr double kSupport = 1e4;
 
+/// What goes faster than this, by its user's will or because it strays so far from what was solved in a step, may have
+/// been teleported, see isTeleport [m/s].
+inline constexpr double kTeleportSpeed = 50.0;
+
 /// The pieces of a collision shape, and what shows that the shape has changed under us. Concave pieces are only named:
 /// their triangles are read from the shape in every step.
 struct ShapePieces {
@@ -45,7 +49,7 @@ class Obstacles {
     /// has already made, instead of the coming one. Links that are not prescribed get their mass from coupleLinks. What
     /// an obstacle's body rests on is kept here until the next step begins.
     Obstacle make(btCollisionObject& object, double h, const RigidContacts* contacts, bool hasMoved);
-    /// Where a static or kinematic object begins a motion that it has made already, see make().
+    /// Where an object begins a motion that it has made already, see make().
     Frame startOf(const btCollisionObject& object, double h);
     /// Shapes without any piece that shells can touch are reported here once, by Bullet's name of the shape.
     std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }
@@ -69,8 +73,9 @@ class Obstacles {
     struct Pose {
         long step;
         btTransform now, before;
+        Vec6 ofTeleport = Vec6::Zero();  ///< what Bullet took for the body's velocity when it was teleported last
     };
-    Vec6 prescribedTwist(const btCollisionObject& object, double h, double radius);
+    Vec6 prescribedTwist(const btCollisionObject& object, double h);
     std::unordered_map<const btCollisionObject*, Pose> m_poses;  ///< of static and kinematic objects
     std::vector<std::vector<BodySupport>> m_supports;  ///< of the step's bodies; those beyond m_supportCount: free
     std::size_t m_supportCount = 0;

@@ -125,7 +125,8 @@ void ShellBody::anchorTo(int vertex, btCollisionObject& body) {
     requireVertex(vertex, "ShellBody::anchor");
     unanchor(vertex);  // two would be two equations for the same unknowns
     if (m_shell.isPinned(vertex) || m_shell.isGuided(vertex)) m_shell.unpin(vertex);
-    m_anchors.push_back({vertex, &body, body.getWorldTransform().inverse() * m_positions[vertex]});
+    const btTransform& pose = body.getWorldTransform();
+    m_anchors.push_back({vertex, &body, pose.inverse() * m_positions[vertex], pose});
     activate();
 }
 

@@ -28,6 +28,7 @@
 #include "ShellContacts.h"
 #include "ShellProxy.h"
 #include "Sleepers.h"
+#include "Teleports.h"
 #include "WarmStart.h"
 #include "jacket/Island.h"
 
@@ -217,6 +218,7 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     m_report = report;
     m_impl->obstacles.beginStep();
     releaseAnchors(*world);
+    followTeleports(double(h));
     followGravity(double(h));
     std::pmr::vector<ShellBody*> all(&m_impl->memory);
     for (const auto& shell : m_shells) all.push_back(shell.get());
@@ -245,6 +247,7 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     forgetPushes(*world);
     sleepers.rest(gravity, double(h));
     updateAllBounds(double(h));
+    for (const auto& shell : m_shells) Teleports::notePoses(*shell);
     m_impl->manifolds.update(*world, m_shells);
     m_report.secondsTotal = seconds() - start;
 }
@@ -273,6 +276,16 @@ void ShellWorld::releaseAnchors(btCollisionWorld& world) {
             if (anchor.bodyId < 0) anchor.bodyId = id;
             return id < 0 || id != anchor.bodyId;
         });
+    }
+}
+
+/// Shells go with bodies that have been teleported since the last step, or are let go of by them.
+void ShellWorld::followTeleports(double h) {
+    Teleports teleports(m_impl->obstacles, h);
+    for (const auto& shell : m_shells) {
+        const auto [hasMoved, letGo] = teleports.follow(*shell);
+        if (hasMoved) m_impl->carried.forget(*shell);
+        if (letGo > 0) m_impl->checks.noteLetGo(*shell, letGo);
     }
 }
 

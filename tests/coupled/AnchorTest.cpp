@@ -1,7 +1,9 @@
 // Vertices that are tied to bodies.
 #include <gtest/gtest.h>
+#include <jacket/bullet/ShellDynamicsWorld.h>
 
 #include <functional>
+#include <memory>
 #include <numeric>
 #include <vector>
 
@@ -266,6 +268,200 @@ TEST(Anchors, SpinNoLightBodyFarFromThem) {
             EXPECT_LT(energyGain(scene, 1.0, kStep), 0.05 * start) << lever;
             EXPECT_LT((totalMomentum(scene) - momentum).norm(), bulletTolerance(1e-9, 1e-5));
         }
+}
+
+/// A cape that hangs on the back of a capsule, which its user moves or puts elsewhere.
+template <class World>
+struct Wearer : Scene<World> {
+    btRigidBody& body;
+    ShellBody& cape;
+    int substeps;  ///< of a frame
+
+    explicit Wearer(int count = 1, double gravity = -9.81, double mass = 0.0, const ShellOptions& options = {})
+        : Scene<World>(gravity),
+          body(this->addBody(std::make_unique<btCapsuleShape>(btScalar(0.3), btScalar(1.2)), mass, btVector3(0, 0, 0))),
+          cape(this->shells->add(hanging(), materials::cotton(), options)),
+          substeps(count) {
+        if (mass == 0.0) makeKinematic(body);
+        for (const int vertex : top()) cape.anchor(vertex, body);
+    }
+    static TriangleMesh hanging() {
+        TriangleMesh mesh = squareSheet(0.8, 8);
+        mesh.positions.row(1) = mesh.positions.row(2).array() + 0.2;
+        mesh.positions.row(2).setConstant(-0.32);
+        return mesh;
+    }
+    static std::vector<int> top() { return {72, 73, 74, 75, 76, 77, 78, 79, 80}; }
+    static std::vector<int> bottom() { return {0, 1, 2, 3, 4, 5, 6, 7, 8}; }
+
+    void frame() { this->world.stepSimulation(btScalar(kStep), substeps + 1, btScalar(kStep / substeps)); }
+    void runOn(double seconds) {
+        for (double t = 0; t < seconds; t += kStep) frame();
+    }
+    static btTransform taken(const btTransform& pose, const btVector3& way, double turn = 0.0) {
+        return btTransform(btQuaternion(btVector3(0, 1, 0), btScalar(turn)) * pose.getRotation(),
+                           pose.getOrigin() + way);
+    }
+    void take(const btVector3& way, double turn = 0.0) {
+        body.setWorldTransform(taken(body.getWorldTransform(), way, turn));
+    }
+    /// The cape in the body's frame.
+    std::vector<btVector3> worn() const {
+        std::vector<btVector3> result;
+        for (const btVector3& x : cape.positions()) result.push_back(body.getWorldTransform().inverse() * x);
+        return result;
+    }
+    double fastest() const { return cape.shell().velocities().colwise().norm().maxCoeff(); }
+};
+
+/// Largest distance of one another [m]; of all vertices, or of some.
+double distance(const std::vector<btVector3>& a, const std::vector<btVector3>& b, std::vector<int> vertices = {}) {
+    if (vertices.empty()) {
+        vertices.resize(a.size());
+        std::iota(vertices.begin(), vertices.end(), 0);
+    }
+    double result = 0.0;
+    for (const int i : vertices) result = std::max(result, double((a[i] - b[i]).length()));
+    return result;
+}
+
+const double kAtAnchor = bulletTolerance(1e-9, 1e-5);  // [m]
+const btVector3 kFar(3, 0, 4);
+
+template <class World>
+class Teleport : public ::testing::Test {};
+using KindsOfWorld = ::testing::Types<btDiscreteDynamicsWorld, ShellDynamicsWorld<>>;
+TYPED_TEST_SUITE(Teleport, KindsOfWorld);
+
+TYPED_TEST(Teleport, TakesACapeAlongAsItIs) {
+    for (const int substeps : {1, 4})
+        for (const bool sleeping : {false, true}) {
+            Wearer<TypeParam> wearer(substeps, -9.81, 0.0, {.sleeping = sleeping});
+            wearer.runOn(sleeping ? 6.0 : 1.0);
+            ASSERT_EQ(wearer.cape.isAsleep(), sleeping);
+            const auto before = wearer.worn();
+            wearer.take(kFar, 2.0);
+            for (int frame = 0; frame < 30; ++frame) {
+                wearer.frame();
+                ASSERT_LT(distance(before, wearer.worn()), 1e-3) << substeps << " substeps, frame " << frame;
+                ASSERT_LT(distance(before, wearer.worn(), wearer.top()), kAtAnchor) << frame;
+                ASSERT_LT(wearer.fastest(), 0.02) << substeps << " substeps, frame " << frame;
+            }
+            EXPECT_TRUE(wearer.shells->takeWarnings().empty());
+        }
+}
+
+/// Without gravity a cape in motion moves on as if its body had stayed.
+TYPED_TEST(Teleport, TurnsACapesVelocities) {
+    Wearer<TypeParam> put(1, 0.0, 0.0, {.tolerance = 1e-9}), kept(1, 0.0, 0.0, {.tolerance = 1e-9});
+    for (auto* wearer : {&put, &kept}) {
+        wearer->cape.setVelocity(btVector3(btScalar(0.3), 0, -1));
+        wearer->runOn(0.2);
+    }
+    put.take(kFar, 2.0);
+    for (int frame = 0; frame < 12; ++frame) {
+        put.frame();
+        kept.frame();
+        ASSERT_LT(distance(put.worn(), kept.worn()), bulletTolerance(1e-4, 1e-3)) << "frame " << frame;
+    }
+    EXPECT_GT(kept.fastest(), 0.3);
+}
+
+/// What else holds a cape that the wearer leaves.
+enum class Held { ByPins, ByAGuide, ByAnotherBody };
+
+template <class World>
+void hold(Wearer<World>& wearer, Held how) {
+    auto& post = wearer.addBox(btVector3(btScalar(0.1), btScalar(0.1), btScalar(0.1)), 0.0, btVector3(-2, 0, 0));
+    if (how == Held::ByAGuide) return wearer.cape.shell().guide(4, Vec3(0, 0, 1));
+    for (const int vertex : wearer.bottom())
+        if (how == Held::ByPins)
+            wearer.cape.pin(vertex);
+        else
+            wearer.cape.anchor(vertex, post);
+}
+
+TYPED_TEST(Teleport, LetsGoOfWhatElseIsHeld) {
+    for (const int substeps : {1, 4})
+        for (const bool sleeping : {false, true})
+            for (const Held how : {Held::ByPins, Held::ByAGuide, Held::ByAnotherBody}) {
+                Wearer<TypeParam> wearer(substeps, -9.81, 0.0, {.sleeping = sleeping});
+                hold(wearer, how);
+                wearer.runOn(sleeping ? 6.0 : 1.0);
+                const double energyBefore = energy(wearer).total();
+                wearer.take(kFar, 2.0);
+                for (int frame = 0; frame < 30; ++frame) {
+                    wearer.frame();
+                    ASSERT_LT(energy(wearer).total() - energyBefore, 1e-3) << "frame " << frame;
+                    ASSERT_LT(wearer.fastest(), 5.0) << "frame " << frame;  // falls
+                }
+                EXPECT_EQ(wearer.shells->takeWarnings().size(), 1u);
+                EXPECT_EQ(wearer.cape.anchorImpulse(76), Vec3(Vec3::Zero()));
+                EXPECT_FALSE(wearer.cape.isAsleep());
+            }
+}
+
+/// All of the bodies that a figure is made of.
+TYPED_TEST(Teleport, TakesAlongWhatIsTiedToBodiesThatGoTogether) {
+    Wearer<TypeParam> wearer;
+    auto& arm = wearer.addSphere(0.1, 0.0, btVector3(btScalar(0.4), btScalar(0.6), btScalar(-0.3)));
+    makeKinematic(arm);
+    wearer.cape.anchor(80, arm);
+    wearer.runOn(1.0);
+    const auto before = wearer.worn();
+    wearer.take(kFar);
+    arm.setWorldTransform(wearer.taken(arm.getWorldTransform(), kFar));
+    wearer.runOn(0.2);
+    EXPECT_LT(distance(before, wearer.worn()), 1e-3);
+    arm.setWorldTransform(wearer.taken(arm.getWorldTransform(), kFar));  // alone
+    wearer.runOn(0.2);
+    EXPECT_LT(distance(before, wearer.worn(), {72, 73, 74, 75, 76, 77, 78, 79}), kAtAnchor);
+    EXPECT_EQ(wearer.shells->takeWarnings().size(), 1u);
+}
+
+TYPED_TEST(Teleport, LeavesACapeWhereItsUserPutsIt) {
+    Wearer<TypeParam> wearer;
+    wearer.runOn(1.0);
+    const auto before = wearer.worn();
+    wearer.take(kFar);
+    std::vector<btVector3> there(wearer.cape.positions().begin(), wearer.cape.positions().end());
+    for (btVector3& x : there) x += kFar;
+    wearer.cape.setPositions(there);
+    wearer.runOn(0.2);
+    EXPECT_LT(distance(before, wearer.worn()), 1e-3);
+}
+
+/// Its motion has been solved for already; that is done again where it is now.
+TYPED_TEST(Teleport, TakesAlongWhatIsTiedToAFreeBody) {
+    for (const int substeps : {1, 4}) {
+        Wearer<TypeParam> put(substeps, 0.0, 10.0), kept(substeps, 0.0, 10.0);
+        for (auto* wearer : {&put, &kept}) {
+            wearer->body.setLinearVelocity(btVector3(0, 0, 1));
+            wearer->runOn(0.5);
+        }
+        const auto before = put.worn();
+        put.body.setCenterOfMassTransform(put.taken(put.body.getWorldTransform(), kFar));
+        for (int frame = 0; frame < 10; ++frame) {
+            put.frame();
+            kept.frame();
+            ASSERT_LT(distance(before, put.worn(), put.top()), bulletTolerance(1e-6, 1e-4)) << frame;
+            ASSERT_LT(distance(put.worn(), kept.worn()), 0.05) << substeps << " substeps, frame " << frame;
+        }
+    }
+}
+
+/// A body that flies fast is no teleported one: the cape hangs on it by its inertia alone.
+TYPED_TEST(Teleport, IsNotWhatTakesABodyOnForManySteps) {
+    constexpr double kSpeed = 30.0;
+    Wearer<TypeParam> wearer;
+    wearer.runOn(1.0);
+    const auto before = wearer.worn();
+    for (int frame = 0; frame < 30; ++frame) {
+        wearer.take(btVector3(0, 0, btScalar(kSpeed * kStep)));
+        wearer.frame();
+        ASSERT_LT(distance(before, wearer.worn(), wearer.top()), kAtAnchor) << "frame " << frame;
+    }
+    EXPECT_GT(distance(before, wearer.worn()), 0.5);  // it trails
 }
 
 }  // namespace

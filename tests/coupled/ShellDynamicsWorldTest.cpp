@@ -59,6 +59,37 @@ TEST(ShellDynamicsWorld, AKinematicBodyGoesItsWayEvenlyOverTheSubsteps) {
     EXPECT_NEAR(pusher.getLinearVelocity().y(), 0.4 * 60, bulletTolerance(1e-9, 1e-3));
 }
 
+/// Where it was put it is in every substep, and not for a while in between.
+TEST(ShellDynamicsWorld, ATeleportedBodyIsThereAtOnce) {
+    InterpolatingScene scene(0.0);
+    auto& pusher = scene.addBox(btVector3(1, 1, 1), 0, btVector3(0, 0, 0));
+    makeKinematic(pusher);
+    Recorder recorder{&pusher, {}};
+    scene.world.setInternalTickCallback(&Recorder::tick, &recorder);
+    pusher.setWorldTransform(btTransform(btQuaternion(btVector3(0, 1, 0), 1), btVector3(0, 20, 0)));
+    scene.world.stepSimulation(btScalar(4.0 / 240), 10, btScalar(1.0 / 240));
+    ASSERT_EQ(recorder.poses.size(), 4u);
+    for (const btTransform& pose : recorder.poses) EXPECT_EQ(pose, pusher.getWorldTransform());
+    EXPECT_EQ(pusher.getWorldTransform().getOrigin().y(), btScalar(20));
+}
+
+/// A ball that flies at 60 m/s is a teleported one in its first frame alone.
+TEST(ShellDynamicsWorld, AFastBodyIsTakenOnEvenly) {
+    InterpolatingScene scene(0.0);
+    auto& pusher = scene.addSphere(0.1, 0, btVector3(0, 0, 0));
+    makeKinematic(pusher);
+    Recorder recorder{&pusher, {}};
+    scene.world.setInternalTickCallback(&Recorder::tick, &recorder);
+    for (int frame = 1; frame <= 3; ++frame) {
+        recorder.poses.clear();
+        pusher.setWorldTransform(btTransform(btQuaternion::getIdentity(), btVector3(0, btScalar(frame), 0)));
+        scene.world.stepSimulation(btScalar(4.0 / 240), 10, btScalar(1.0 / 240));
+        ASSERT_EQ(recorder.poses.size(), 4u);
+        for (int k = 1; k <= 4 && frame > 1; ++k)
+            EXPECT_NEAR(recorder.poses[k - 1].getOrigin().y(), frame - 1 + k / 4.0, bulletTolerance(1e-9, 1e-5));
+    }
+}
+
 /// Lifted by 3 cm a frame of 4 substeps, the sheet on a plate never is that far off it.
 TEST(ShellDynamicsWorld, ASheetStaysOnAKinematicPlate) {
     InterpolatingScene scene;

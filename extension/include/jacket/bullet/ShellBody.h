@@ -87,7 +87,9 @@ class ShellBody {
     /// Ties a vertex to a body at their present distance. One thing at a time holds a vertex, the one that was asked
     /// for last: an anchor ends the vertex's pin, guide or earlier anchor (also to the same body), and what pins,
     /// clamps or guides the vertex ends its anchor. The body may be removed at any time, which frees the vertex (also
-    /// if the body is added again: a new entry of the broadphase is a new body). Throws std::out_of_range.
+    /// if the body is added again: a new entry of the broadphase is a new body). A body that is teleported (see
+    /// isTeleport) takes the shell along as it is, turned with the body, if no pins, guides or other bodies hold it
+    /// that stay; else it lets go, of which ShellWorld::takeWarnings() tells. Throws std::out_of_range.
     void anchor(int vertex, btRigidBody& body);
     void anchor(int vertex, btMultiBodyLinkCollider& link);
     /// Ends a vertex's anchor, if it has one; throws std::out_of_range.
@@ -125,11 +127,13 @@ class ShellBody {
     friend class FastBodies;
     friend class IslandFinder;
     friend class Sleepers;
+    friend class Teleports;
     ShellBody(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options);
     struct Anchor {
         int vertex;
         btCollisionObject* body;
         btVector3 local;              ///< in the body's frame
+        btTransform pose;             ///< of the body as the last step left it
         int bodyId = -1;              ///< the broadphase's; -1: not asked for yet
         Vec3 impulse = Vec3::Zero();  ///< on the body, in the last substep [N s]
     };

@@ -13,8 +13,9 @@
 namespace jacket::bullet {
 
 /// A Bullet world that owns its shells, and does for them what a btActionInterface cannot: kinematic bodies go their
-/// way evenly over the substeps of a stepSimulation (Bullet moves them to the end in the first one), and shells are
-/// drawn between fixed steps as Bullet's motion states are. `Base`: btDiscreteDynamicsWorld or a world derived from it.
+/// way evenly over the substeps of a stepSimulation (Bullet moves them to the end in the first one, and so does this if
+/// that isTeleport, unless they came as fast), and shells are drawn between fixed steps as Bullet's motion states are.
+/// `Base`: btDiscreteDynamicsWorld or a world derived from it.
 template <class Base = btDiscreteDynamicsWorld>
 class ShellDynamicsWorld : public Base {
   public:
@@ -56,14 +57,22 @@ class ShellDynamicsWorld : public Base {
 
   protected:
     void saveKinematicState(btScalar span) override {
+        std::swap(m_motions, m_last);
         m_motions.clear();
         for (int i = 0; i < this->m_collisionObjects.size(); ++i) {
             btRigidBody* body = btRigidBody::upcast(this->m_collisionObjects[i]);
             if (body && body->isKinematicObject() && body->getActivationState() != ISLAND_SLEEPING)
-                m_motions.push_back({body, body->getInterpolationWorldTransform(), body->getWorldTransform()});
+                m_motions.push_back(
+                    {body, body->getInterpolationWorldTransform(), body->getWorldTransform(), btVector3(0, 0, 0)});
         }
         Base::saveKinematicState(span);  // takes the new poses from the motion states
-        for (Motion& motion : m_motions) motion.to = motion.body->getWorldTransform();
+        for (Motion& motion : m_motions) {
+            motion.to = motion.body->getWorldTransform();
+            const btVector3 way = motion.to.getOrigin() - motion.from.getOrigin();
+            motion.velocity = way / span;
+            const bool isJump = isTeleport(*motion.body, double(way.length()), double(span));
+            if (isJump && !goesOn(motion)) motion.from = motion.to;
+        }
         m_span = span;
         m_elapsed = 0;
     }
@@ -85,13 +94,21 @@ class ShellDynamicsWorld : public Base {
     struct Motion {
         btRigidBody* body;
         btTransform from, to;
+        btVector3 velocity;  ///< mean [m/s]
         btTransform at(btScalar part) const {
             if (part > btScalar(1) - btScalar(1e-6)) return to;  // exactly, and not to rounding
             return btTransform(from.getRotation().slerp(to.getRotation(), part),
                                from.getOrigin().lerp(to.getOrigin(), part));
         }
     };
-    std::vector<Motion> m_motions;
+    /// Whether a body has come about as fast as it is to go.
+    bool goesOn(const Motion& motion) const {
+        const auto before =
+            std::find_if(m_last.begin(), m_last.end(), [&](const Motion& last) { return last.body == motion.body; });
+        return before != m_last.end() &&
+               (motion.velocity - before->velocity).length() < btScalar(0.5) * motion.velocity.length();
+    }
+    std::vector<Motion> m_motions, m_last;  ///< of this stepSimulation, and of the one before
     btScalar m_span = 0, m_elapsed = 0;
     std::vector<std::pair<const btCollisionObject*, std::vector<btVector3>>> m_before;  ///< positions a substep ago
     ShellWorld m_shells{*this};  ///< last, as it leaves the world first

@@ -8,12 +8,17 @@
 #include "jacket/bullet/ShellBody.h"
 #include "jacket/loadMesh.h"
 
+class btCollisionObject;
 class btDynamicsWorld;
 
 /// Shells of Bullet worlds. Link jacket::bullet (Bullet's float library) or jacket::bullet_float64.
 namespace jacket::bullet {
 
 struct Island;
+
+/// Whether a body that goes such a way [m] in a time [s] is teleported, and does not move: faster than 50 m/s, and
+/// farther than four times the radius of the ball about its origin that holds its shape. One that is pushes nothing.
+bool isTeleport(const btCollisionObject& body, double way, double time);
 
 /// What the last substep cost and did, over all shells. A substep counts once for each of its sums since the world was
 /// made, however many shells there are and although those just added are solved for twice.
@@ -83,6 +88,7 @@ class ShellWorld : public btActionInterface {
   private:
     struct Impl;
     void releaseAnchors(btCollisionWorld& world);
+    void followTeleports(double h);
     void followGravity(double h);
     void solveNewcomers(btCollisionWorld& world, double h);
     void alterBodies(btCollisionWorld& world, bool isSolvedAnew);
