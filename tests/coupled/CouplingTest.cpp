@@ -10,9 +10,9 @@ namespace jacket::bullet::testing {
 namespace {
 
 /// A ball of 2 kg, radius 0.25 m, falls 0.75 m onto a sheet pinned at its border.
-class Trampoline : public ::testing::TestWithParam<int> {};
+class FallingBall : public ::testing::TestWithParam<int> {};
 
-TEST_P(Trampoline, TheBallStaysOnIt) {
+TEST_P(FallingBall, StaysOnTheTrampoline) {
     BulletScene scene;
     auto& ball = scene.addSphere(0.25, 2.0, btVector3(0, 1, 0));
     auto& sheet = scene.shells->add(squareSheet(2, GetParam() - 1), trampolineCloth());
@@ -31,18 +31,32 @@ TEST_P(Trampoline, TheBallStaysOnIt) {
     EXPECT_EQ(scene.shells->lastStep().rejectedSteps, 0);
     RecordProperty("penetration_mm", std::to_string(1e3 * deepest));
 }
-INSTANTIATE_TEST_SUITE_P(Sizes, Trampoline, ::testing::Values(11, 21, 31));
+INSTANTIATE_TEST_SUITE_P(Sizes, FallingBall, ::testing::Values(11, 21, 31));
 
 /// Body mass over vertex mass, step, and one of several heights a little aside: where ball and vertices meet differs.
-class MassRatio : public ::testing::TestWithParam<std::tuple<double, double, int>> {};
+class MassRatio : public ::testing::TestWithParam<std::tuple<double, double, int>> {
+  protected:
+    static constexpr int kCells = 20;
+    static constexpr double kVertexMass = 0.3 * 4.0 / (kCells * kCells);
+
+    /// A ball of 3 t would stretch the cloth of the others to a multiple of its size, and slip through.
+    static ShellMaterial clothFor(double ratio) {
+        ShellMaterial cloth = trampolineCloth();
+        if (ratio > 1e5) cloth.stretchStiffnessOverride = 1e5;
+        return cloth;
+    }
+    /// Whether the ball is above what it stretches lowest.
+    static bool isOn(const ShellBody& sheet, const btRigidBody& ball) {
+        return double(ball.getWorldTransform().getOrigin().y()) > sheet.shell().positions().row(1).minCoeff();
+    }
+};
 
 TEST_P(MassRatio, TheBallNeverLeavesFasterThanFreeFallBroughtIt) {
     const auto [ratio, h, start] = GetParam();
     BulletScene scene;
-    const int cells = 20;
-    const double vertexMass = 0.3 * 4.0 / (cells * cells), height = 1.0 + 0.01 * start;
-    auto& ball = scene.addSphere(0.25, ratio * vertexMass, btVector3(btScalar(0.003 * start), btScalar(height), 0));
-    auto& sheet = scene.shells->add(squareSheet(2, cells), trampolineCloth());
+    const double height = 1.0 + 0.01 * start;
+    auto& ball = scene.addSphere(0.25, ratio * kVertexMass, btVector3(btScalar(0.003 * start), btScalar(height), 0));
+    auto& sheet = scene.shells->add(squareSheet(2, kCells), clothFor(ratio));
     pinBorder(sheet);
     for (double t = 0; t < 2.0; t += h) {
         scene.step(h);
@@ -54,10 +68,16 @@ TEST_P(MassRatio, TheBallNeverLeavesFasterThanFreeFallBroughtIt) {
         ASSERT_LT(0.5 * rise * rise + 9.81 * x.y(), 9.81 * height + 0.5 * std::pow(9.81 * h, 2) + 1e-6)
             << "at " << t << " s";
     }
+    // Not of the lightest balls in the longest steps: of 20 starts 10 to 13 fall through at 1e-3, 2 to 5 at 1e-2, and
+    // no step says so.
+    if (ratio > 1e-2 || h < 0.1) {
+        EXPECT_TRUE(isOn(sheet, ball) || scene.shells->lastStep().passedSteps > 0);
+    }
 }
 INSTANTIATE_TEST_SUITE_P(Grid, MassRatio,
-                         ::testing::Combine(::testing::Values(1e-3, 1.0, 1e2, 1e5),
-                                            ::testing::Values(1.0 / 240, 1.0 / 60, 1.0 / 10), ::testing::Values(0)));
+                         ::testing::Combine(::testing::Values(1e-3, 1.0, 1e2, 1e5, 1e6),
+                                            ::testing::Values(1e-3, 1.0 / 240, 1.0 / 60, 1.0 / 10),
+                                            ::testing::Values(0)));
 INSTANTIATE_TEST_SUITE_P(Light, MassRatio,
                          ::testing::Combine(::testing::Values(1e-3, 1e-2), ::testing::Values(1.0 / 10),
                                             ::testing::Range(1, 5)));
