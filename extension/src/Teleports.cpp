@@ -24,7 +24,9 @@ bool isInReach(const Shell& shell, const Frame& leap) {
 
 Teleports::Outcome Teleports::follow(ShellBody& shell) {
     Outcome outcome;
-    if (const std::optional<Frame> leap = leapOf(shell); leap && isInReach(shell.shell(), *leap)) {
+    std::optional<Frame> leap = leapOf(shell);
+    if (!leap) leap = offsetOf(shell);
+    if (leap && isInReach(shell.shell(), *leap)) {
         move(shell, *leap);
         outcome.hasMoved = true;
     }
@@ -48,6 +50,26 @@ std::optional<Frame> Teleports::leapOf(const ShellBody& shell) {
         return anchor.body != lost->body && !isLost(shell, anchor);
     });
     return isHeld ? std::nullopt : leapOf(*lost);
+}
+
+/// From where the last step left the kinematic body that holds it to where that begins its motion: Bullet takes it to
+/// the end of all substeps in the first, with the velocity that takes it there in all. A shell that nothing else holds
+/// and that is yet to be solved for this motion goes along; what is tied alone would tear at it.
+std::optional<Frame> Teleports::offsetOf(const ShellBody& body) {
+    constexpr double kShare = 0.1;  // of a substep's motion: more than rounding
+    const auto& anchors = body.m_anchors;
+    if (anchors.empty() || body.m_hasVelocity || body.isAsleep() || isPinnedOrGuided(body.shell())) return std::nullopt;
+    const ShellBody::Anchor& first = anchors.front();
+    const auto isOfFirst = [&](const auto& anchor) { return anchor.body == first.body; };
+    if (!first.body->isKinematicObject() || !std::all_of(anchors.begin(), anchors.end(), isOfFirst))
+        return std::nullopt;
+    const Frame start = m_obstacles.startOf(*first.body, m_h);
+    const Vec3 now = fromBullet(first.body->getWorldTransform().getOrigin());
+    const Vec3 place = start * fromBullet(first.local);
+    const double motion = (now - start.translation()).norm();
+    const double gap = (place - body.shell().positions().col(first.vertex)).norm();
+    if (motion == 0.0 || !(gap > kShare * motion)) return std::nullopt;
+    return start * fromBullet(first.pose).inverse(Eigen::Isometry);
 }
 
 /// How its body was taken from where the last step left it to where it begins its motion, if that was a teleport. Free

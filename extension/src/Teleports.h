@@ -7,7 +7,8 @@
 namespace jacket::bullet {
 
 /// Shells that are tied to bodies which have been teleported since the last step. No solve could take them along: a
-/// shell that nothing else holds is put where the body is, as it is; from others such bodies are untied.
+/// shell that nothing else holds is put where the body is, as it is; from others such bodies are untied. So is a shell
+/// put where a kinematic body begins its motion, should that not be where it was.
 class Teleports {
   public:
     Teleports(Obstacles& obstacles, double h) : m_obstacles(obstacles), m_h(h) {}
@@ -23,6 +24,7 @@ class Teleports {
   private:
     std::optional<Frame> leapOf(const ShellBody& shell);
     std::optional<Frame> leapOf(const ShellBody::Anchor& anchor);
+    std::optional<Frame> offsetOf(const ShellBody& body);
     bool isLost(const ShellBody& shell, const ShellBody::Anchor& anchor);
     static void move(ShellBody& shell, const Frame& by);
 

@@ -450,6 +450,26 @@ TYPED_TEST(Teleport, TakesAlongWhatIsTiedToAFreeBody) {
     }
 }
 
+/// Bullet takes a kinematic body to the end of a frame in its first substep. The cape hangs on it as if it went evenly.
+TEST(Anchors, FollowAWalkerInManySubstepsAsEvenly) {
+    constexpr int kSubsteps = 4;
+    for (const double speed : {2.0, 10.0, 30.0}) {
+        Wearer<btDiscreteDynamicsWorld> led;
+        Wearer<ShellDynamicsWorld<>> evenlyLed;
+        const auto walk = [&](auto& wearer) {
+            wearer.take(btVector3(0, 0, btScalar(speed * kSubsteps * kStep)));
+            wearer.world.stepSimulation(btScalar(kSubsteps * kStep), kSubsteps + 1, btScalar(kStep));
+        };
+        const auto before = led.worn();
+        for (int frame = 0; frame < 15; ++frame) {
+            walk(led);
+            walk(evenlyLed);
+            ASSERT_LT(distance(before, led.worn(), led.top()), kAtAnchor) << speed << " m/s, frame " << frame;
+        }
+        EXPECT_LT(distance(led.worn(), evenlyLed.worn()), 0.01) << speed << " m/s";
+    }
+}
+
 /// A body that flies fast is no teleported one: the cape hangs on it by its inertia alone.
 TYPED_TEST(Teleport, IsNotWhatTakesABodyOnForManySteps) {
     constexpr double kSpeed = 30.0;
