@@ -14,14 +14,17 @@ namespace {
 using jacket::testing::energy;
 using jacket::testing::Scene;
 
-/// A ball of 5 mm that comes with 400 m/s, 6.7 m a step. Mass [kg], whether it is launched between two steps, where it
-/// comes from [m].
-class Bullet : public ::testing::TestWithParam<std::tuple<double, bool, btVector3>> {};
+/// A ball of 5 mm that comes with 400 m/s, 6.7 m a step. Mass [kg], whether it is launched between two steps, from
+/// which of three places.
+class Bullet : public ::testing::TestWithParam<std::tuple<double, bool, int>> {};
 
 TEST_P(Bullet, NeverPassesSilentlyAndGainsNoEnergy) {
-    const auto& [mass, launched, from] = GetParam();
+    const auto [mass, launched, from] = GetParam();
+    const btVector3 places[] = {btVector3(btScalar(0.013), 1, btScalar(0.021)),
+                                btVector3(btScalar(0.025), btScalar(2.139), btScalar(-0.215)),
+                                btVector3(btScalar(0.005), btScalar(2.684), btScalar(0.035))};
     Target scene;
-    auto& ball = scene.addSphere(0.0025, mass, from);
+    auto& ball = scene.addSphere(0.0025, mass, places[from]);
     if (launched) scene.step(1.0 / 60);
     ball.setLinearVelocity(btVector3(0, -400, 0));
     const double start = energy(scene).total();
@@ -36,12 +39,9 @@ TEST_P(Bullet, NeverPassesSilentlyAndGainsNoEnergy) {
     EXPECT_TRUE(std::isfinite(double(ball.getLinearVelocity().length2())));
     EXPECT_TRUE(scene.sheet.shell().positions().allFinite());
 }
-INSTANTIATE_TEST_SUITE_P(
-    Masses, Bullet,
-    ::testing::Combine(::testing::Values(1e-3, 1e-2, 1e-1, 1.0), ::testing::Bool(),
-                       ::testing::Values(btVector3(btScalar(0.013), 1, btScalar(0.021)),
-                                         btVector3(btScalar(0.025), btScalar(2.139), btScalar(-0.215)),
-                                         btVector3(btScalar(0.005), btScalar(2.684), btScalar(0.035)))));
+INSTANTIATE_TEST_SUITE_P(Masses, Bullet,
+                         ::testing::Combine(::testing::Values(1e-3, 1e-2, 1e-1, 1.0), ::testing::Bool(),
+                                            ::testing::Range(0, 3)));
 
 /// Slower ones, whether they fly from the first step or are launched between two steps, where the last solve knew
 /// nothing of their speed. Shape, launched, height [m]: how far off the first step ends.
