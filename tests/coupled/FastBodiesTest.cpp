@@ -14,17 +14,21 @@ namespace {
 using jacket::testing::energy;
 using jacket::testing::Scene;
 
-/// A ball of 5 mm that comes with 400 m/s, 6.7 m a step. Mass [kg], whether it is launched between two steps, from
-/// which of three places.
+/// A ball of 5 or 10 mm that comes with 400 m/s, 6.7 m a step. Mass [kg], whether it is launched between two steps,
+/// which of three shots.
 class Bullet : public ::testing::TestWithParam<std::tuple<double, bool, int>> {};
 
 TEST_P(Bullet, NeverPassesSilentlyAndGainsNoEnergy) {
-    const auto [mass, launched, from] = GetParam();
-    const btVector3 places[] = {btVector3(btScalar(0.013), 1, btScalar(0.021)),
-                                btVector3(btScalar(0.025), btScalar(2.139), btScalar(-0.215)),
-                                btVector3(btScalar(0.005), btScalar(2.684), btScalar(0.035))};
+    struct Shot {
+        double radius;
+        btVector3 from;
+    };
+    const Shot shots[] = {{0.005, btVector3(btScalar(0.013), 1, btScalar(0.021))},
+                          {0.0025, btVector3(btScalar(0.025), btScalar(2.139), btScalar(-0.215))},
+                          {0.0025, btVector3(btScalar(0.005), btScalar(2.684), btScalar(0.035))}};
+    const auto [mass, launched, which] = GetParam();
     Target scene;
-    auto& ball = scene.addSphere(0.0025, mass, places[from]);
+    auto& ball = scene.addSphere(shots[which].radius, mass, shots[which].from);
     if (launched) scene.step(1.0 / 60);
     ball.setLinearVelocity(btVector3(0, -400, 0));
     const double start = energy(scene).total();

@@ -25,68 +25,63 @@ using jacket::testing::Scene;
 
 using InterpolatingScene = Scene<ShellDynamicsWorld<>>;
 
-/// Poses of a body at the end of every substep.
-struct Recorder {
-    btRigidBody* body = nullptr;
-    std::vector<btTransform> poses;
-    static void tick(btDynamicsWorld* world, btScalar) {
-        auto& self = *static_cast<Recorder*>(world->getWorldUserInfo());
-        self.poses.push_back(self.body->getWorldTransform());
+/// A kinematic body that is led in frames of four substeps, at the end of each of which its pose is noted.
+struct LedBody : InterpolatingScene {
+    static constexpr int kSubsteps = 4;
+    btRigidBody& body;
+    std::vector<btTransform> poses;  ///< in the last frame
+
+    explicit LedBody(std::unique_ptr<btCollisionShape> shape)
+        : InterpolatingScene(0.0), body(addBody(std::move(shape), 0, btVector3(0, 0, 0))) {
+        makeKinematic(body);
+        world.setInternalTickCallback(&LedBody::note, this);
+    }
+    void lead(const btTransform& pose) {
+        poses.clear();
+        body.setWorldTransform(pose);
+        world.stepSimulation(btScalar(kSubsteps / 240.0), 10, btScalar(1.0 / 240));
+    }
+    static void note(btDynamicsWorld* world, btScalar) {
+        auto& self = *static_cast<LedBody*>(world->getWorldUserInfo());
+        self.poses.push_back(self.body.getWorldTransform());
     }
 };
 
 TEST(ShellDynamicsWorld, AKinematicBodyGoesItsWayEvenlyOverTheSubsteps) {
-    InterpolatingScene scene(0.0);
-    auto& pusher = scene.addBox(btVector3(1, 1, 1), 0, btVector3(0, 0, 0));
-    makeKinematic(pusher);
-    Recorder recorder{&pusher, {}};
-    scene.world.setInternalTickCallback(&Recorder::tick, &recorder);
+    LedBody led(std::make_unique<btBoxShape>(btVector3(1, 1, 1)));
     for (int frame = 1; frame <= 2; ++frame) {
-        recorder.poses.clear();
         const btQuaternion turn(btVector3(0, 1, 0), btScalar(frame));  // 1 rad a frame
-        pusher.setWorldTransform(btTransform(turn, btVector3(0, btScalar(0.4 * frame), 0)));
-        scene.world.stepSimulation(btScalar(4.0 / 240), 10, btScalar(1.0 / 240));
-        ASSERT_EQ(recorder.poses.size(), 4u);
+        led.lead(btTransform(turn, btVector3(0, btScalar(0.4 * frame), 0)));
+        ASSERT_EQ(led.poses.size(), 4u);
         for (int k = 1; k <= 4; ++k) {
-            const btTransform& pose = recorder.poses[k - 1];
+            const btTransform& pose = led.poses[k - 1];
             EXPECT_NEAR(pose.getOrigin().y(), 0.4 * (frame - 1 + k / 4.0), bulletTolerance(1e-9, 1e-5));
             EXPECT_NEAR(
                 btQuaternion(btVector3(0, 1, 0), btScalar(frame - 1 + k / 4.0)).angleShortestPath(pose.getRotation()),
                 0.0, bulletTolerance(1e-6, 1e-3));
         }
-        EXPECT_EQ(pusher.getWorldTransform().getOrigin().y(), btScalar(0.4 * frame));
+        EXPECT_EQ(led.body.getWorldTransform().getOrigin().y(), btScalar(0.4 * frame));
     }
-    EXPECT_NEAR(pusher.getLinearVelocity().y(), 0.4 * 60, bulletTolerance(1e-9, 1e-3));
+    EXPECT_NEAR(led.body.getLinearVelocity().y(), 0.4 * 60, bulletTolerance(1e-9, 1e-3));
 }
 
 /// Where it was put it is in every substep, and not for a while in between.
 TEST(ShellDynamicsWorld, ATeleportedBodyIsThereAtOnce) {
-    InterpolatingScene scene(0.0);
-    auto& pusher = scene.addBox(btVector3(1, 1, 1), 0, btVector3(0, 0, 0));
-    makeKinematic(pusher);
-    Recorder recorder{&pusher, {}};
-    scene.world.setInternalTickCallback(&Recorder::tick, &recorder);
-    pusher.setWorldTransform(btTransform(btQuaternion(btVector3(0, 1, 0), 1), btVector3(0, 20, 0)));
-    scene.world.stepSimulation(btScalar(4.0 / 240), 10, btScalar(1.0 / 240));
-    ASSERT_EQ(recorder.poses.size(), 4u);
-    for (const btTransform& pose : recorder.poses) EXPECT_EQ(pose, pusher.getWorldTransform());
-    EXPECT_EQ(pusher.getWorldTransform().getOrigin().y(), btScalar(20));
+    LedBody led(std::make_unique<btBoxShape>(btVector3(1, 1, 1)));
+    led.lead(btTransform(btQuaternion(btVector3(0, 1, 0), 1), btVector3(0, 20, 0)));
+    ASSERT_EQ(led.poses.size(), 4u);
+    for (const btTransform& pose : led.poses) EXPECT_EQ(pose, led.body.getWorldTransform());
+    EXPECT_EQ(led.body.getWorldTransform().getOrigin().y(), btScalar(20));
 }
 
 /// A ball that flies at 60 m/s is a teleported one in its first frame alone.
 TEST(ShellDynamicsWorld, AFastBodyIsTakenOnEvenly) {
-    InterpolatingScene scene(0.0);
-    auto& pusher = scene.addSphere(0.1, 0, btVector3(0, 0, 0));
-    makeKinematic(pusher);
-    Recorder recorder{&pusher, {}};
-    scene.world.setInternalTickCallback(&Recorder::tick, &recorder);
+    LedBody led(std::make_unique<btSphereShape>(btScalar(0.1)));
     for (int frame = 1; frame <= 3; ++frame) {
-        recorder.poses.clear();
-        pusher.setWorldTransform(btTransform(btQuaternion::getIdentity(), btVector3(0, btScalar(frame), 0)));
-        scene.world.stepSimulation(btScalar(4.0 / 240), 10, btScalar(1.0 / 240));
-        ASSERT_EQ(recorder.poses.size(), 4u);
+        led.lead(btTransform(btQuaternion::getIdentity(), btVector3(0, btScalar(frame), 0)));
+        ASSERT_EQ(led.poses.size(), 4u);
         for (int k = 1; k <= 4 && frame > 1; ++k)
-            EXPECT_NEAR(recorder.poses[k - 1].getOrigin().y(), frame - 1 + k / 4.0, bulletTolerance(1e-9, 1e-5));
+            EXPECT_NEAR(led.poses[k - 1].getOrigin().y(), frame - 1 + k / 4.0, bulletTolerance(1e-9, 1e-5));
     }
 }
 
