@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iomanip>
 #include <sstream>
+#include <utility>
 
 #include "Islands.h"
 
@@ -67,7 +68,15 @@ ShellChecks::Known& ShellChecks::known(const ShellBody& shell) {
 void ShellChecks::lookAtGravity(const btVector3& gravity) {
     if (isFinite(gravity) || m_warnedOfGravity) return;
     m_warnedOfGravity = true;
-    m_warnings.push_back("shells keep the last finite gravity while the world's is not finite");
+    m_warnings.emplace_back("shells keep the last finite gravity while the world's is not finite");
+}
+
+bool ShellChecks::isLength(btScalar h) {
+    if (std::isfinite(h) && h >= btScalar(0)) return true;
+    if (!std::exchange(m_warnedOfLength, true))
+        m_warnings.push_back("shells reject steps of " + std::to_string(double(h)) +
+                             " s: a length must be finite and >= 0");
+    return false;
 }
 
 void ShellChecks::noteLetGo(const ShellBody& shell, int anchors) {

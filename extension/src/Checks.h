@@ -15,12 +15,15 @@ struct Island;
 /// What makes a body unusable for a solve, e.g. "position is not finite"; null: nothing.
 const char* defectOf(const btCollisionObject& object);
 
-/// Sizes that hardly are what the user wants, told once per shell and by its name, and gravity that cannot be used.
+/// Sizes that hardly are what the user wants, told once per shell and by its name, and gravity and steps that cannot be
+/// used.
 class ShellChecks {
   public:
     void look(const Island& island);
     void noteLetGo(const ShellBody& shell, int anchors);
     void lookAtGravity(const btVector3& gravity);
+    /// Whether a step can be that long [s]; warns once where it never could.
+    bool isLength(btScalar h);
     void forget(const ShellBody& shell) { m_known.erase(&shell); }
     std::vector<std::string> takeWarnings() { return std::exchange(m_warnings, {}); }
 
@@ -31,7 +34,7 @@ class ShellChecks {
     };
     Known& known(const ShellBody& shell);
     std::map<const ShellBody*, Known> m_known;
-    bool m_warnedOfGravity = false;
+    bool m_warnedOfGravity = false, m_warnedOfLength = false;
     std::vector<std::string> m_warnings;
 };
 

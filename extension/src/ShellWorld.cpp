@@ -206,7 +206,11 @@ std::vector<std::string> ShellWorld::takeWarnings() {
 /// then the next solve looks at this configuration, and its impulses enter Bullet's next solve. Shells among kinematic
 /// bodies have that solve when these have moved.
 void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
-    if (!(h > btScalar(0) && std::isfinite(h))) return;
+    if (!m_impl->checks.isLength(h)) {
+        ++m_report.rejectedSteps;
+        return;
+    }
+    if (h == btScalar(0)) return;
     alterBodies(*world, false);
     if (m_shells.empty()) return forgetPushes(*world);
     const double start = seconds();

@@ -181,6 +181,10 @@ TEST(BadInput, StepsWithoutAFinitePositiveLengthMoveNoShell) {
         ASSERT_NO_THROW(scene.shells->updateAction(&scene.world, h)) << h;
         EXPECT_EQ(sheet.shell().positions(), before) << h;
     }
+    EXPECT_EQ(scene.shells->lastStep().rejectedSteps, 3);  // all but that of length 0
+    const auto warnings = scene.shells->takeWarnings();
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find("steps of inf s"), std::string::npos) << warnings[0];
     ASSERT_NO_THROW(scene.world.stepSimulation(kInfinity, 0, kInfinity));
     scene.run(0.5, kStep);
     EXPECT_TRUE(sheet.shell().positions().allFinite());

@@ -28,7 +28,7 @@ struct WorldReport {
     bool settled = true;          ///< false: contacts of a shell have used up their rounds
     bool finite = true;           ///< false: a shell's step was rejected; it stood still
     bool passed = false;          ///< a fast body went through a shell, or may have
-    int rejectedSteps = 0;        ///< since the world was made: those that were not `finite`
+    int rejectedSteps = 0;        ///< since the world was made: not `finite`, or of no possible length
     int unconvergedSteps = 0;     ///< since the world was made
     int unsettledSteps = 0;       ///< since the world was made
     int passedSteps = 0;          ///< since the world was made
