@@ -5,37 +5,14 @@
 #include <cmath>
 #include <tuple>
 
-#include "support/BulletScene.h"
+#include "support/Incline.h"
 
 namespace jacket::bullet::testing {
 namespace {
 
 using jacket::testing::Scene;
 
-constexpr double kGravity = 9.81, kSide = 0.2;
-const double kTilt = 20 * M_PI / 180;  // tan = 0.364
-
-/// A plane that falls off towards +x, with a sheet of cloth that lies on it as far above as contact keeps it.
-struct Incline : Scene<> {
-    const Vec3 normal{std::sin(kTilt), std::cos(kTilt), 0}, downhill{std::cos(kTilt), -std::sin(kTilt), 0};
-    btRigidBody& plane;
-    ShellBody& sheet;
-
-    Incline(double friction, double side, int cells)
-        : plane(addBody(std::make_unique<btStaticPlaneShape>(toBullet(normal), btScalar(0)), 0, btVector3(0, 0, 0))),
-          sheet(shells->add(lying(side, cells), trampolineCloth(), {.friction = friction, .sleeping = false})) {
-        plane.setFriction(1);
-    }
-    static btVector3 toBullet(const Vec3& v) { return {btScalar(v.x()), btScalar(v.y()), btScalar(v.z())}; }
-    TriangleMesh lying(double side, int cells) const {
-        TriangleMesh mesh = squareSheet(side, cells);
-        const Mat3 turn = Eigen::AngleAxisd(-kTilt, Vec3::UnitZ()).toRotationMatrix();
-        mesh.positions = (turn * mesh.positions).colwise() + (0.5 * trampolineCloth().thickness + 5e-6) * normal;
-        return mesh;
-    }
-    double place() const { return downhill.dot(sheet.shell().positions().rowwise().mean()); }
-    double speed() const { return downhill.dot(sheet.shell().velocities().rowwise().mean()); }
-};
+constexpr double kSide = 0.2;
 
 /// Cells along a side, step.
 class SheetOnIncline : public ::testing::TestWithParam<std::tuple<int, double>> {};
@@ -46,7 +23,7 @@ TEST_P(SheetOnIncline, SticksWithoutCreepBelowTheAngleOfFriction) {
     const Points start = scene.sheet.shell().positions();
     scene.run(5.0, h);
     const double moved = (scene.downhill.transpose() * (scene.sheet.shell().positions() - start)).cwiseAbs().maxCoeff();
-    EXPECT_LT(moved, 5.0 * 1e-4 * std::sqrt(kGravity * kSide));
+    EXPECT_LT(moved, 5.0 * Incline::mostCreep(kSide));
 }
 
 TEST_P(SheetOnIncline, SlidesAsCoulombSaysAboveIt) {
@@ -55,13 +32,13 @@ TEST_P(SheetOnIncline, SlidesAsCoulombSaysAboveIt) {
         Incline scene(friction, kSide, cells);
         const double start = scene.place(), seconds = 0.75;
         scene.run(seconds, h);
-        const double acceleration = kGravity * (std::sin(kTilt) - friction * std::cos(kTilt));
-        const double expected = acceleration * (seconds + h);  // velocities hold the coming substep's gravity already
+        // Velocities hold the coming substep's gravity already.
+        const double expected = Incline::accelerationByCoulomb(friction) * (seconds + h);
         EXPECT_NEAR(scene.speed(), expected, 0.02 * expected) << "friction " << friction;
 
         const double mass = scene.sheet.shell().masses().sum();
-        const double fallen = std::sin(kTilt) * (scene.place() - start + h * scene.speed());
-        const double heat = mass * kGravity * fallen - 0.5 * mass * scene.speed() * scene.speed();
+        const double fallen = std::sin(Incline::kTilt) * (scene.place() - start + h * scene.speed());
+        const double heat = mass * Incline::kGravity * fallen - 0.5 * mass * scene.speed() * scene.speed();
         EXPECT_NEAR(scene.sheet.ledger().frictionLoss, heat, 0.02 * heat) << "friction " << friction;
     }
 }
@@ -83,7 +60,7 @@ TEST_P(RollingBall, AcceleratesAsASolidSphereDoes) {
     auto& ball = scene.addSphere(radius, 0.2, Incline::toBullet(start));
     ball.setFriction(1);
     ball.setIgnoreCollisionCheck(&scene.plane, true);
-    const double h = 1.0 / 240, gravity = kGravity * std::sin(kTilt);
+    const double h = 1.0 / 240, gravity = Incline::kGravity * std::sin(Incline::kTilt);
     scene.run(seconds, h);
     // The sheet's impulses answer the coming substep's gravity already, which the ball gets only then.
     const double v = scene.downhill.dot(toVec3(ball.getLinearVelocity())) + h * gravity;
