@@ -85,8 +85,8 @@ Vec6 IslandSolver::Impl::excessOf(int body, const Vec6& residual) const {
     return supports.masses()[dynamic] * preconditioner.twistBy(dynamic, residual);
 }
 
-/// The shells' part of it. Walls take what is missing: a shell that they hold is stiff, and its mass would turn little
-/// force into much speed. A shell that touches none moves by it.
+/// The shells' part of it. Walls take what is missing, and bodies much heavier than the shell: a shell that they hold
+/// is stiff, and its mass would turn little force into much speed, into them. A shell that touches none moves by it.
 void IslandSolver::Impl::shift(const IslandInput& input, std::span<const Vec3> onShells,
                                std::vector<ContactImpulse>& impulses) {
     system.velocities(u, reached);  // `v` may have been cut short since
@@ -104,10 +104,17 @@ void IslandSolver::Impl::shift(const IslandInput& input, std::span<const Vec3> o
     }
 }
 
-/// Adds an impulse to those that walls have given a shell by contacts and anchors; false if there are none.
+/// Adds an impulse to those that walls, and what is as good as one to a shell, have given it by contacts and anchors;
+/// false if there are none.
 bool IslandSolver::Impl::giveToWalls(const IslandInput& input, int shell, const Vec3& impulse,
                                      std::vector<ContactImpulse>& impulses) const {
-    const auto isWalls = [&](int ofShell, int body) { return ofShell == shell && input.bodies[body].prescribed; };
+    constexpr double kHeavy = 2.0;  // times the shell's mass
+    const double least = kHeavy * input.shells[shell]->masses().sum();
+    const auto isWalls = [&](int ofShell, int body) {
+        if (ofShell != shell) return false;
+        const int dynamic = dynamicIndex[body];
+        return dynamic < 0 || supports.ownMass(dynamic).diagonal().head<3>().minCoeff() > least;
+    };
     double pressed = 0.0;
     for (const ContactImpulse& one : impulses)
         if (isWalls(one.contact.shell, one.contact.body)) pressed += one.impulse.norm();

@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <tuple>
 #include <vector>
 
 #include "support/HardScenes.h"
+#include "support/PlateScene.h"
 #include "support/Random.h"
 
 namespace jacket::bullet::testing {
@@ -141,6 +143,34 @@ TEST_P(LightBoxOnMetal, IsNotThrown) {
     for (const unsigned seed : {1u, 2u, 3u, 4u}) EXPECT_LT(fastest(light, heavy, seed), 10.0) << "mesh " << seed;
 }
 INSTANTIATE_TEST_SUITE_P(Masses, LightBoxOnMetal, ::testing::Values(std::tuple{0.1, 100.0}, std::tuple{1.0, 1.0}));
+
+/// Sheets laid over a box that stands free on a floor: their overhang swings down and beats against its sides, and
+/// their weight stays on it. Material, cells along 90 cm, steps a second.
+class SheetOnCrate : public ::testing::TestWithParam<std::tuple<const char*, int, int>> {
+  protected:
+    static ShellMaterial material(const std::string& name) {
+        if (name == "cotton") return materials::cotton();
+        if (name == "denim") return materials::denim();
+        if (name == "rubber") return materials::rubber();
+        return materials::steel(5e-4);
+    }
+};
+
+TEST_P(SheetOnCrate, IsNotCutInto) {
+    const auto [name, cells, stepsASecond] = GetParam();
+    for (const double aside : {0.0, 2e-3}) {  // vertices lie exactly over its edges, or beside them
+        const PlateScene scene{material(name), 0.9, cells, 1.0 / stepsASecond, 20.0, aside};
+        const PlateScene::Outcome outcome = scene.run();
+        EXPECT_EQ(outcome.fault(), nullptr)
+            << (outcome.fault() ? outcome.fault() : "") << ", " << aside << " m aside: " << outcome.deepest << " m, "
+            << outcome.fastest << " m/s, " << outcome.unsettled << " steps";
+    }
+}
+const auto kSheets = ::testing::Values("cotton", "denim", "rubber", "steel");
+INSTANTIATE_TEST_SUITE_P(Coarse, SheetOnCrate,
+                         ::testing::Combine(kSheets, ::testing::Values(6), ::testing::Values(60, 240)));
+INSTANTIATE_TEST_SUITE_P(Fine, SheetOnCrate,
+                         ::testing::Combine(kSheets, ::testing::Values(12), ::testing::Values(60, 240)));
 
 /// Three flat boxes fall a little into a sheet that is held along two edges, and stay a stack.
 TEST(Stack, StandsInAHammock) {

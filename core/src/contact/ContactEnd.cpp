@@ -130,13 +130,15 @@ bool ContactResponse::isAnyDeep() const {
 
 /// The touch that a contact belongs to, -1: none. A point that has moved on to a neighbouring face is still the same.
 /// Where a body lies on a face with more than a point, as a box or a cylinder does on one larger than it, the solve
-/// takes out one end of it and the next one finds the other: these are two.
+/// takes out one end of it and the next one finds the other: these are two. So are those of triangles that fold around
+/// a free body's corner: one contact for all would push each of their ways in turn, and never settle.
 int ContactResponse::touchOf(const Contact& contact) const {
     const auto known = m_index.find(keyOf(contact));
     if (contact.isVertex()) return known == m_index.end() ? -1 : known->second;
     const auto isNear = [&](const Touch& touch) {
         const Contact& other = touch.contact;
         return !other.isVertex() && other.shell == contact.shell && other.body == contact.body &&
+               (m_dynamicIndex[contact.body] < 0 || other.normal.dot(contact.normal) > kSameWay) &&
                (other.point - contact.point).norm() <
                    kSamePoint * std::min(m_edge[contact.shell], m_input.bodies[contact.body].radius);
     };
@@ -179,6 +181,17 @@ bool ContactResponse::isSaidByVertex(const Contact& contact) const {
     return raised != m_raised.end() && isAlong(raised->second);
 }
 
+/// Whether a face's contact is to wait until its vertices, which this round takes out of the body, are out: where it
+/// stood as deep along its normal before the step, which is then not the way that it came in. Where vertices over the
+/// edges of a box go down by more than the sheet is thick, it would be pushed off the box's sides.
+bool ContactResponse::isForVertices(const Contact& contact, const IslandVelocities& solved) const {
+    const double before = contact.gap - m_input.h * relativeVelocity(makeTouch(contact), solved).dot(contact.normal);
+    if (before > -slopOf(contact)) return false;
+    for (int a = 0; a < 3; ++a)
+        if (contact.weights[a] > 0.0 && m_raised.count(globalVertex(contact, a)) > 0) return true;
+    return false;
+}
+
 bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round) {
     const int known = touchOf(contact);
     const bool fresh = known < 0;
@@ -189,6 +202,7 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     const bool isNewFace = !contact.isVertex() && !held;
     if (isNewFace && isSaidByVertex(contact)) return false;
     m_deepestGap = std::min(m_deepestGap, lacks);
+    if (isNewFace && isForVertices(contact, solved)) return true;
     if (!fresh && !held && m_touches[known].changes >= kMostChanges) return false;
     if (isNewFace) {
         // Of features that share vertices the deepest comes first, for the others may be cured with it.
@@ -275,6 +289,7 @@ bool ContactResponse::entersThere(const Contact& contact, const Touch& touch, co
 /// once; a row for every chord would only fight them. False when the vertices do not touch the body there: a body
 /// smaller than a triangle.
 bool ContactResponse::liftVertices(const Contact& contact, double by, const IslandVelocities& solved) {
+    if (!isQuick() && contact.weights.maxCoeff() > 1.0 - kNearEdge) return false;  // an edge or corner of the body
     const double most = kMostOffset * m_edge[contact.shell];
     double carried = 0.0;
     std::array<Touch*, 3> touches{};

@@ -763,12 +763,12 @@ void ContactResponse::readImpulses(const CoupledSystem& system, const IslandVelo
     }
 }
 
-/// What pulls at a wall has no friction either. Held by both it would come back and stick: what the friction held can
-/// lead into the wall by more than what pulled led out of it. Where there are rounds enough, the friction goes first:
-/// often it pulls because of that only.
+/// What pulls at a wall has no friction either, nor what sticks to a free body. Held by both it would come back and
+/// stick: what the friction held can lead into the wall by more than what pulled led out of it. Where there are rounds
+/// enough, the friction goes first: often it pulls because of that only.
 void ContactResponse::letGo(Touch& touch) const {
     const bool hadFriction = touch.sticks || touch.slip.known;
-    if (!isQuick() && touch.dynamicBody < 0) {
+    if (!isQuick() && (touch.dynamicBody < 0 || touch.sticks)) {
         dropFriction(touch);
         if (hadFriction && m_care.rounds == kAtLength.rounds) return;
     }

@@ -244,6 +244,7 @@ class ContactResponse {
     int touchAtVertex(const Contact& contact, int corner) const;
     bool isNearOthers(int vertex, int body) const;
     bool isSaidByVertex(const Contact& contact) const;
+    bool isForVertices(const Contact& contact, const IslandVelocities& solved) const;
     bool closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round);
     void aim(Touch& touch, double lacks, const IslandVelocities& solved) const;
     bool entersThere(const Contact& contact, const Touch& touch, const IslandVelocities& solved) const;
