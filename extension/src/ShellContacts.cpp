@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "ManifoldPoint.h"
@@ -10,6 +11,7 @@ namespace jacket::bullet {
 namespace {
 
 constexpr double kSameSide = 0.97;   // cosine of the angle below which two normals at a vertex count as one
+constexpr double kOnSurface = 0.01;  // of the contact's thickness: what is nearer to a surface lies on it
 constexpr int kLeastToShare = 1000;  // vertices of a shell from which on threads pay
 constexpr int kAtATime = 1024;       // vertices or triangles that a thread takes
 
@@ -167,6 +169,29 @@ void ShellContacts::markOutside(const Query& query, const ConvexPiece& piece) {
     });
 }
 
+/// A vertex that is put right on a body may lie on an edge of it, or a corner, where the nearest point's normal is any
+/// of many. That of the sheet says on which side of the body it lies. All in the body's frame.
+SurfacePoint ShellContacts::besideSheet(const Query& query, const ConvexPiece& piece, int vertex,
+                                        const SurfacePoint& surface) {
+    const Shell& shell = query.shellBody.shell();
+    Vec3 normal = Vec3::Zero();
+    for (const int t : shell.mesh().trianglesAround(vertex)) {
+        const auto corners = shell.mesh().triangles().col(t);
+        const Vec3 a = query.x.col(corners[0]), b = query.x.col(corners[1]), c = query.x.col(corners[2]);
+        normal += (b - a).cross(c - a);
+    }
+    normal = (query.frame.linear().transpose() * normal).stableNormalized();
+    SurfacePoint best = surface;
+    double most = kSameSide;
+    for (const Vec3& out : {normal, Vec3(-normal)}) {
+        const auto beside = piece.touch(Vec3(surface.point + query.thickness() * out), 2.0 * query.thickness());
+        if (!beside || beside->distance <= 0.0 || beside->normal.dot(out) <= most) continue;
+        most = beside->normal.dot(out);
+        best = {beside->point, beside->normal, surface.distance};
+    }
+    return best;
+}
+
 /// A convex body has one side, which is what its contacts are made with; of others that shows when all are known.
 void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
     const Frame toBody = query.frame.inverse(Eigen::Isometry);
@@ -175,7 +200,9 @@ void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
             if (m_memory.outside[i]) continue;
             const Vec3 x = toBody * Vec3(query.x.col(i));
             const auto surface = piece.touch(x, query.vertexReach + query.thickness());
-            if (surface) append(found, {i, *surface});
+            if (!surface) continue;
+            const bool isOnIt = std::abs(surface->distance) < kOnSurface * query.thickness();
+            append(found, {i, isOnIt ? besideSheet(query, piece, i, *surface) : *surface});
         }
     };
     const auto use = [&](const Memory::Candidate& found) {

@@ -45,6 +45,8 @@ class ShellContacts final : public ContactDetector {
                         const auto& use);
     void markOutside(const Query& query, const ConvexPiece& piece);
     void findVertices(Query& query, const ConvexPiece& piece);
+    static SurfacePoint besideSheet(const Query& query, const ConvexPiece& piece, int vertex,
+                                    const SurfacePoint& surface);
     void findFaces(Query& query, const ConvexPiece& piece);
     static void cover(std::unique_ptr<TrianglePatch>& patch, const ConcavePiece& piece, Bounds near, double margin);
     const TrianglePatch& patchOf(int pair, std::size_t concave, const Sweep& sweep);
