@@ -51,6 +51,7 @@ class LoadedBox : public ::testing::TestWithParam<std::tuple<double, double>> {
 TEST_P(LoadedBox, IsNeitherPressedIntoTheFloorNorThrown) {
     const auto gaps = shell->shell().positions().row(1).array() - height() - kHalf - shell->contactThickness();
     EXPECT_LT(highest, 1e-4);
+    EXPECT_GT(lowest, -1e-4);
     EXPECT_GT(gaps.minCoeff(), -1e-4);
     EXPECT_LT(gaps.maxCoeff(), 1e-4);
     scene.shells->remove(*shell);
