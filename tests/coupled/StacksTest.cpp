@@ -147,7 +147,7 @@ INSTANTIATE_TEST_SUITE_P(Masses, LightBoxOnMetal, ::testing::Values(std::tuple{0
 
 /// Sheets laid over a box that stands free on a floor: their overhang swings down and beats against its sides, and
 /// their weight stays on it. Material, cells along 90 cm, steps a second.
-class SheetOnCrate : public ::testing::TestWithParam<std::tuple<const char*, int, int>> {
+class SheetOnCrate : public ::testing::TestWithParam<std::tuple<std::string, int, int>> {
   protected:
     static ShellMaterial material(const std::string& name) {
         if (name == "cotton") return materials::cotton();
