@@ -422,24 +422,16 @@ INSTANTIATE_TEST_SUITE_P(Fine, PlateOnBox,  // a motion of the whole plate is on
 
 /// Bending spreads over two edges in a step: not enough to be factored completely.
 /// Where the middle of a sheet is put right on a box, with vertices on its edges and corners, nearest points there have
-/// no normal of their own.
+/// no normal of their own: held by the box's sides, hardly half of the sheet would bear.
 TEST(Contact, ASheetPutRightOnABoxLiesOnItsTop) {
     constexpr double kHalf = 0.3;
-    for (const double tilt : {0.0, 0.5}) {
-        Scene scene;
-        const btQuaternion turn(btVector3(0, 0, 1), btScalar(tilt));
-        auto& box = scene.addBox(btVector3(btScalar(kHalf), btScalar(kHalf), btScalar(kHalf)), 0, btVector3(0, 0, 0));
-        box.setWorldTransform(btTransform(turn, btVector3(0, 0, 0)));
-        auto& sheet = scene.shells->add(squareSheet(2 * kHalf, 6), materials::steel(1e-3));
-        std::vector<btVector3> x(sheet.positions().begin(), sheet.positions().end());
-        for (btVector3& p : x) p = box.getWorldTransform() * (p + btVector3(0, btScalar(kHalf), 0));
-        sheet.setPositions(x);
-        scene.step(kStep);
-        ASSERT_FALSE(sheet.contacts().empty());
-        const Vec3 up = toVec3(box.getWorldTransform().getBasis() * btVector3(0, 1, 0));
-        for (const BodyContact& contact : sheet.contacts())
-            EXPECT_GT(contact.contact.normal.dot(up), 0.99) << "tilt " << tilt;
-    }
+    Scene scene;
+    scene.addBox(btVector3(btScalar(kHalf), btScalar(kHalf), btScalar(kHalf)), 0, btVector3(0, 0, 0));
+    auto& sheet = scene.shells->add(squareSheet(2 * kHalf, 6), materials::steel(1e-3));
+    place(sheet, {0, double(btScalar(kHalf)), 0});
+    scene.step(kStep);
+    for (const BodyContact& contact : sheet.contacts()) EXPECT_GT(contact.contact.normal.y(), 0.99);
+    EXPECT_GT(sheet.contacts().size(), 36u);  // of 49 vertices
 }
 
 TEST(Contact, AClothOfFineMeshGainsNoEnergyFromABox) {
