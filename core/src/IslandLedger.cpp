@@ -85,8 +85,8 @@ Vec6 IslandSolver::Impl::excessOf(int body, const Vec6& residual) const {
     return supports.masses()[dynamic] * preconditioner.twistBy(dynamic, residual);
 }
 
-/// The shells' part of it. Walls take what is missing, and bodies much heavier than the shell: a shell that they hold
-/// is stiff, and its mass would turn little force into much speed, into them. A shell that touches none moves by it.
+/// The shells' part of it. Walls take what is missing, and bodies twice as heavy as the shell: one that they hold is
+/// stiff, and its mass would turn little force into much speed, into them. A shell that touches none moves by it.
 void IslandSolver::Impl::shift(const IslandInput& input, std::span<const Vec3> onShells,
                                std::vector<ContactImpulse>& impulses) {
     system.velocities(u, reached);  // `v` may have been cut short since

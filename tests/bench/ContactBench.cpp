@@ -4,18 +4,15 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
-#include <random>
+#include <string>
 
 #include "support/Incline.h"
 #include "support/PlateScene.h"
+#include "support/Random.h"
 #include "support/Target.h"
 
 namespace jacket::bullet::testing {
 namespace {
-
-btVector3 at(double x, double y, double z) {
-    return {btScalar(x), btScalar(y), btScalar(z)};
-}
 
 /// Counts what goes wrong of a kind of runs, and says so at its end.
 struct Tally {
@@ -39,8 +36,13 @@ struct Named {
     ShellMaterial material;
 };
 
+const Named kSteel{"steel 0.5 mm", materials::steel(5e-4)}, kThickSteel{"steel 1 mm", materials::steel(1e-3)};
+const Named kRubber{"rubber", materials::rubber()}, kPaper{"paper", materials::paper()};
+const Named kCotton{"cotton", materials::cotton()};
+const Named* const kSoftAndStiff[] = {&kCotton, &kPaper, &kRubber, &kSteel};
+
 bool isFaulty(const char* material, const PlateScene& scene) {
-    const PlateScene::Outcome outcome = scene.run();
+    const SheetOutcome outcome = scene.run();
     const char* const fault = outcome.fault();
     if (fault)
         std::printf(
@@ -52,20 +54,16 @@ bool isFaulty(const char* material, const PlateScene& scene) {
 }
 
 void runPlates() {
-    const Named kinds[] = {{"steel 0.5 mm", materials::steel(5e-4)},
-                           {"steel 1 mm", materials::steel(1e-3)},
-                           {"rubber", materials::rubber()},
-                           {"paper", materials::paper()}};
     Tally tally("plates on a box of 60 cm");
-    for (const Named& kind : kinds)
+    for (const Named* kind : {&kSteel, &kThickSteel, &kRubber, &kPaper})
         for (const double side : {0.6, 0.9})
             for (const int cells : {2, 6, 12})
                 for (const double h : {1.0 / 60, 1.0 / 240})
                     for (const double aside : {0.0, 0.003})
-                        for (const double above : {0.0, 0.5 * kind.material.thickness + 1e-4})
+                        for (const double above : {0.0, 0.5 * kind->material.thickness + 1e-4})
                             for (const double boxMass : {0.0, 20.0})
                                 tally.count(
-                                    isFaulty(kind.name, {kind.material, side, cells, h, boxMass, aside, above}));
+                                    isFaulty(kind->name, {kind->material, side, cells, h, boxMass, aside, above}));
 }
 
 /// A sheet that lies on an incline of 20 degrees.
@@ -103,55 +101,40 @@ struct Inclined {
 };
 
 void runInclines() {
-    const Named kinds[] = {{"cotton", materials::cotton()},
-                           {"paper", materials::paper()},
-                           {"rubber", materials::rubber()},
-                           {"steel 0.5 mm", materials::steel(5e-4)}};
     Tally tally("sheets on an incline");
-    for (const Named& kind : kinds)
+    for (const Named* kind : kSoftAndStiff)
         for (const double side : {0.2, 1.0})
             for (const int cells : {2, 5, 12})
                 for (const double h : {1.0 / 60, 1.0 / 240}) {
-                    const Inclined sheet{kind, side, cells, h};
+                    const Inclined sheet{*kind, side, cells, h};
                     for (const double friction : {0.37, 0.5}) tally.count(sheet.isFaultyHeld(friction));
                     for (const double friction : {0.2, 0.35}) tally.count(sheet.isFaultySliding(friction));
                 }
 }
 
-/// Whether a body ends below a sheet with its border in the plane y = 0 and no step said that it may have passed.
-bool isLostSilently(const BulletScene& scene, const btRigidBody& body, double most) {
-    const btVector3& p = body.getWorldTransform().getOrigin();
-    const bool isBelow = p.y() < btScalar(-most) && std::abs(p.x()) < btScalar(0.5) && std::abs(p.z()) < btScalar(0.5);
-    return isBelow && scene.shells->lastStep().passedSteps == 0;
-}
-
-/// A box of 1 to 3 cm that falls on a pinned sheet of 1 m with cells of 20 to 50 cm, turned any way.
+/// A box of 1 to 3 cm that falls on a pinned sheet of 1 m with cells of 20 to 50 cm, turned any way: whether it ends
+/// below the sheet and no step said that it may have passed.
 bool isSmallBoxLost(unsigned seed, const Named& of) {
-    std::mt19937 random(seed);
-    const auto draw = [&](double from, double to) {
-        return from + (to - from) * (double(random()) / double(std::mt19937::max()));
-    };
+    Random random(seed);
     BulletScene scene;
-    const int cells = int(draw(2.0, 5.99));
+    const int cells = 2 + random.below(4);
     auto& sheet = scene.shells->add(squareSheet(1.0, cells), of.material, {.friction = 0.5});
     pinBorder(sheet);
-    const btVector3 half = at(draw(5e-3, 0.015), draw(5e-3, 0.015), draw(5e-3, 0.015));
-    const double mass = std::exp(draw(std::log(5e-3), std::log(2.0))), speed = draw(0.5, 8.0);
-    auto& box = scene.addBox(half, mass, at(draw(-0.4, 0.4), draw(0.03, 0.15), draw(-0.4, 0.4)));
-    btTransform pose = box.getWorldTransform();
-    pose.setRotation(btQuaternion(btScalar(draw(-3, 3)), btScalar(draw(-3, 3)), btScalar(draw(-3, 3))));
-    box.setWorldTransform(pose);
-    box.setLinearVelocity(at(draw(-1, 1), -speed, draw(-1, 1)));
+    const btVector3 half = random.vector(Vec3::Constant(5e-3), Vec3::Constant(0.015));
+    const double mass = random.logBetween(5e-3, 2.0), speed = random.between(0.5, 8.0);
+    auto& box = scene.addBox(half, mass, random.vector({-0.4, 0.03, -0.4}, {0.4, 0.15, 0.4}));
+    const btVector3 turn = random.vector(Vec3::Constant(-3.0), Vec3::Constant(3.0));
+    box.setWorldTransform(btTransform(btQuaternion(turn.x(), turn.y(), turn.z()), box.getWorldTransform().getOrigin()));
+    box.setLinearVelocity(random.vector({-1, -speed, -1}, {1, -speed, 1}));
     const double h = seed % 2 == 0 ? 1.0 / 60 : 1.0 / 240;
-    const double lowest = [&] {
-        double low = 0.0;
-        for (double t = 0.0; t < 2.0; t += h) {
-            scene.step(h);
-            low = std::min(low, sheet.shell().positions().row(1).minCoeff());
-        }
-        return low;
-    }();
-    const bool isLost = isLostSilently(scene, box, 0.05 - lowest);
+    double lowest = 0.0;
+    for (double t = 0.0; t < 2.0; t += h) {
+        scene.step(h);
+        lowest = std::min(lowest, sheet.shell().positions().row(1).minCoeff());
+    }
+    const Vec3 end = toVec3(box.getWorldTransform().getOrigin());
+    const bool isBelow = end.y() < lowest - 0.05 && std::max(std::abs(end.x()), std::abs(end.z())) < 0.5;
+    const bool isLost = isBelow && scene.shells->lastStep().passedSteps == 0;
     if (isLost)
         std::printf("  lost      box %u of %.2g kg, %.2g m/s on %s, %d cells, 1/%.0f s\n", seed, mass, speed, of.name,
                     cells, 1.0 / h);
@@ -159,12 +142,8 @@ bool isSmallBoxLost(unsigned seed, const Named& of) {
 }
 
 void runSmallBoxes() {
-    const Named kinds[] = {{"cotton", materials::cotton()},
-                           {"paper", materials::paper()},
-                           {"rubber", materials::rubber()},
-                           {"steel 0.5 mm", materials::steel(5e-4)}};
     Tally tally("boxes of 1 to 3 cm on cells of 20 to 50 cm");
-    for (unsigned seed = 0; seed < 1000; ++seed) tally.count(isSmallBoxLost(seed, kinds[seed % 4]));
+    for (unsigned seed = 0; seed < 1000; ++seed) tally.count(isSmallBoxLost(seed, *kSoftAndStiff[seed % 4]));
 }
 
 /// A body of 5 or 10 mm that comes at a sheet of 1 m.

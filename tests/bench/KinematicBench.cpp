@@ -6,17 +6,9 @@
 namespace jacket::bullet::testing {
 namespace {
 
-/// What is wrong, null if nothing is. No body moves faster than 0.75 m/s, and nothing falls from higher than 1 m.
-const char* faultOf(const KinematicScene::Outcome& outcome) {
-    if (outcome.deepest > 5e-4) return "deep";
-    if (outcome.fastest > 5.0) return "thrown";
-    if (outcome.unsettled > 5) return "unsettled";
-    return nullptr;
-}
-
 bool isFaulty(const char* material, const KinematicScene& scene) {
-    const KinematicScene::Outcome outcome = scene.run();
-    const char* const fault = faultOf(outcome);
+    const SheetOutcome outcome = scene.run();
+    const char* const fault = outcome.fault();
     if (!fault) return false;
     std::printf("  %-9s %s %s: %s, %d cells, 1/%.0f s: %.2g mm deep, at most %.2g m/s, %d steps unsettled\n", fault,
                 scene.pusher.name, scene.course.name, material, scene.cells, 1.0 / scene.h, 1e3 * outcome.deepest,

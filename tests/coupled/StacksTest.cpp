@@ -161,7 +161,7 @@ TEST_P(SheetOnCrate, IsNotCutInto) {
     const auto [name, cells, stepsASecond] = GetParam();
     for (const double aside : {0.0, 2e-3}) {  // vertices lie exactly over its edges, or beside them
         const PlateScene scene{material(name), 0.9, cells, 1.0 / stepsASecond, 20.0, aside};
-        const PlateScene::Outcome outcome = scene.run();
+        const SheetOutcome outcome = scene.run();
         EXPECT_EQ(outcome.fault(), nullptr)
             << (outcome.fault() ? outcome.fault() : "") << ", " << aside << " m aside: " << outcome.deepest << " m, "
             << outcome.fastest << " m/s, " << outcome.unsettled << " steps";

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "support/BulletScene.h"
+#include "support/SheetOutcome.h"
 #include "support/Target.h"
 
 /// Bodies that their user moves against a sheet of 80 cm for 4 s, starting and stopping at once: tests run some of them
@@ -96,11 +97,7 @@ struct KinematicScene {
     double h;                   ///< [s]
     Vec3 aside = Vec3::Zero();  ///< by which the body's way is beside the course's [m]
 
-    struct Outcome {
-        double deepest = 0.0, fastest = 0.0;  ///< the sheet, in the body or the floor [m], one of its vertices [m/s]
-        int unsettled = 0;                    ///< steps
-    };
-    Outcome run() const {
+    SheetOutcome run() const {
         constexpr double kSide = 0.8, kSeconds = 4.0;  // [m], [s]
         BulletScene scene;
         scene.addFloor();
@@ -115,14 +112,13 @@ struct KinematicScene {
         auto& body = scene.addBody(pusher.make(), 0.0, pose(0.0).getOrigin());
         makeKinematic(body);
         const auto surface = pusher.surface();
-        Outcome outcome;
+        SheetOutcome outcome;
         for (double t = h; t < kSeconds; t += h) {
             body.setWorldTransform(pose(t));
             scene.step(h);
-            outcome.deepest = std::max({outcome.deepest, penetration(sheet, *surface, body.getWorldTransform()),
-                                        -sheet.shell().positions().row(1).minCoeff()});
-            outcome.fastest = std::max(outcome.fastest, sheet.shell().velocities().colwise().norm().maxCoeff());
-            outcome.unsettled += scene.shells->lastStep().settled ? 0 : 1;
+            outcome.note(scene, sheet,
+                         std::max(penetration(sheet, *surface, body.getWorldTransform()),
+                                  -sheet.shell().positions().row(1).minCoeff()));  // or in the floor
         }
         return outcome;
     }

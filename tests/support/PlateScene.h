@@ -1,7 +1,6 @@
 #pragma once
-#include <algorithm>
-
 #include "support/HardScenes.h"
+#include "support/SheetOutcome.h"
 
 namespace jacket::bullet::testing {
 
@@ -14,18 +13,7 @@ struct PlateScene {
     double boxMass;                    ///< 0: fixed [kg]
     double aside = 0.0, above = 1e-3;  ///< of its middle beside the box's, and above its top [m]
 
-    struct Outcome {
-        double deepest = 0.0, fastest = 0.0;  ///< the sheet, in the box [m], one of its vertices [m/s]
-        int unsettled = 0;                    ///< steps
-        /// What is wrong, null if nothing is.
-        const char* fault() const {
-            if (deepest > 5e-4) return "deep";
-            if (fastest > 5.0) return "thrown";
-            if (unsettled > 5) return "unsettled";
-            return nullptr;
-        }
-    };
-    Outcome run() const {
+    SheetOutcome run() const {
         constexpr double kHalf = 0.3, kSeconds = 2.0;  // of the box [m], [s]
         BulletScene scene;
         scene.addFloor();
@@ -33,12 +21,10 @@ struct PlateScene {
                                  btVector3(0, btScalar(kHalf), 0));
         auto& sheet = scene.shells->add(squareSheet(side, cells), material, {.friction = 0.5});
         place(sheet, {aside, 2.0 * kHalf + above, 0.7 * aside});
-        Outcome outcome;
+        SheetOutcome outcome;
         for (double t = 0.0; t < kSeconds; t += h) {
             scene.step(h);
-            outcome.deepest = std::max(outcome.deepest, penetration(sheet, box));
-            outcome.fastest = std::max(outcome.fastest, sheet.shell().velocities().colwise().norm().maxCoeff());
-            outcome.unsettled += scene.shells->lastStep().settled ? 0 : 1;
+            outcome.note(scene, sheet, penetration(sheet, box));
         }
         return outcome;
     }

@@ -1,0 +1,28 @@
+#pragma once
+#include <algorithm>
+
+#include "support/BulletScene.h"
+
+namespace jacket::bullet::testing {
+
+/// What a run was at worst, where no body moves faster than a walk and nothing falls from higher than 1 m.
+struct SheetOutcome {
+    double deepest = 0.0, fastest = 0.0;  ///< the sheet, in a body [m], one of its vertices [m/s]
+    int unsettled = 0;                    ///< steps
+
+    /// After a step; `depth` of the sheet in bodies then [m].
+    void note(const BulletScene& scene, const ShellBody& sheet, double depth) {
+        deepest = std::max(deepest, depth);
+        fastest = std::max(fastest, sheet.shell().velocities().colwise().norm().maxCoeff());
+        unsettled += scene.shells->lastStep().settled ? 0 : 1;
+    }
+    /// What is wrong, null if nothing is.
+    const char* fault() const {
+        if (deepest > 5e-4) return "deep";
+        if (fastest > 5.0) return "thrown";
+        if (unsettled > 5) return "unsettled";
+        return nullptr;
+    }
+};
+
+}  // namespace jacket::bullet::testing
