@@ -51,7 +51,7 @@ void IslandSolver::Impl::attempt(const IslandInput& input) {
     StepReport& report = lastReport;
     clearReport();
     impulseShare = 1.0;
-    unsettled = false;
+    unsettled = isTooLong = false;
     times = {};
     givesWay = givesWay || !wouldBeStrained(input);
     gather(input);
@@ -59,7 +59,7 @@ void IslandSolver::Impl::attempt(const IslandInput& input) {
     beginContacts(input);
     lap.addTo(times.contact);
     solveStep(input, report);  // A, b; filtered PCG until the contacts agree
-    if (!report.limited && pushesStrain(input)) {
+    if (!isTooLong && !report.limited && pushesStrain(input)) {
         givesWay = false;
         stepsInFull = 0;
         gather(input);
@@ -67,6 +67,7 @@ void IslandSolver::Impl::attempt(const IslandInput& input) {
         solveStep(input, report);
     }
     report.times = times;
+    if (isTooLong) return;
     report.finite = u.allFinite() && unfiltered().allFinite();
     if (!report.finite) return;
     if (!dynamicBodies.empty()) limitBodies(input, report);
@@ -77,9 +78,9 @@ void IslandSolver::Impl::attempt(const IslandInput& input) {
     report.mayPass = response.hasFastBody() && (report.limited || unsettled);
 }
 
-/// Whether contacts with a fast body did not settle in the whole of a step.
+/// Whether contacts with a fast body did not settle in the whole of a step, or Newton's method.
 bool IslandSolver::Impl::isWorthParts() const {
-    return (lastReport.passed || lastReport.mayPass) && mayBeShorter;
+    return isTooLong || ((lastReport.passed || lastReport.mayPass) && mayBeShorter);
 }
 
 void IslandSolver::Impl::solveInParts(const IslandInput& input) {
@@ -187,6 +188,7 @@ void IslandSolver::Impl::store(const IslandInput& input) {
         // The solved change of momentum, not the sum of the contacts' impulses: a light body would feel their residual.
         body.impulse = body.prescribed ? Vec6::Zero() : Vec6(momentum.col(dynamicIndex[b]));
     }
+    if ((report.limited || !report.settled) && dynamicBodies.empty()) makePossible(input, report.contacts);
     balance(input, report.contacts);
     if (!report.limited) pushOut(input, report);
     if (!isFinite(input)) return reject();

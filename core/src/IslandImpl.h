@@ -38,6 +38,7 @@ struct IslandSolver::Impl {
     std::vector<double> stepOf;      ///< of each shell, as its integrator counts it [s]
     std::vector<char> factored;      ///< shells: completely
     bool mayBeShorter = false;       ///< the step that is being solved
+    bool isTooLong = false;          ///< the step that was attempted, to be solved
     bool givesWay = true;            ///< false for as long as wouldBeStrained says: see pushesStrain
     int stepsInFull = 0;             ///< that have been taken since givesWay became false
     Points lastChange;               ///< dv of the last step
@@ -84,7 +85,10 @@ struct IslandSolver::Impl {
 
     // IslandSolve.cpp: the solve, linearised as often as it takes, and in rounds with the contacts
     void solveStep(const IslandInput& input, StepReport& report);
+    bool isAmongWalls(const IslandInput& input) const;
+    bool mayBeInParts(const IslandInput& input) const;
     bool descend(const IslandInput& input, StepReport& report);
+    void readImpulses(const IslandInput& input);
     bool improves(const IslandInput& input);
     bool overstretches(const IslandInput& input, bool isAgain) const;
     void assemble(const IslandInput& input, bool atEnd);
@@ -121,6 +125,7 @@ struct IslandSolver::Impl {
 
     // IslandLedger.cpp: impulses that add up
     void pushOut(const IslandInput& input, StepReport& report);
+    void makePossible(const IslandInput& input, std::span<ContactImpulse> impulses) const;
     void balance(const IslandInput& input, std::vector<ContactImpulse>& impulses);
     Vec6 excessOf(int body, const Vec6& residual) const;
     void shift(const IslandInput& input, std::span<const Vec3> onShells, std::vector<ContactImpulse>& impulses);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <memory_resource>
 #include <span>
 #include <vector>
@@ -16,6 +17,15 @@ Vec3 contactArm(const IslandInput& input, const Contact& contact) {
     return arm;
 }
 
+/// The part of a contact's impulse that it can give: it pushes, with friction as Coulomb allows it.
+Vec3 possiblePart(const ContactImpulse& one) {
+    const Vec3& n = one.contact.normal;
+    const double pressing = std::max(0.0, one.impulse.dot(n));
+    const Vec3 across = one.impulse - one.impulse.dot(n) * n;
+    const double most = one.contact.friction * pressing, size = across.norm();
+    return pressing * n + (size > most ? Vec3(across * (most / size)) : across);
+}
+
 /// By how much damping makes a mass harder to move.
 double damping(const IslandInput& input, const Shell& shell) {
     return 1.0 + input.h * shell.material().massDamping;
@@ -30,6 +40,25 @@ void IslandSolver::Impl::pushOut(const IslandInput& input, StepReport& report) {
     for (std::size_t i = solved; i < report.contacts.size(); ++i) {
         const auto& [contact, impulse, sticks, slip] = report.contacts[i];
         input.bodies[contact.body].impulse -= pointImpulse(impulse, contactArm(input, contact));
+    }
+}
+
+/// Where contacts did not settle, some push by a multiple of what others pull, and what bears the shell may yield to
+/// the moment of that. Of each shell's contacts with walls what can be is taken, as much as makes up what they gave it.
+void IslandSolver::Impl::makePossible(const IslandInput& input, std::span<ContactImpulse> impulses) const {
+    constexpr double kLeast = 1e-6;  // so that they still share what is missing
+    for (std::size_t k = 0; k < input.shells.size(); ++k) {
+        Vec3 before = Vec3::Zero(), after = Vec3::Zero();
+        for (ContactImpulse& one : impulses) {
+            if (one.contact.shell != static_cast<int>(k)) continue;
+            before += one.impulse;
+            one.impulse = possiblePart(one);
+            after += one.impulse;
+        }
+        if (after.isZero(0.0)) continue;
+        const double share = std::clamp(before.dot(after) / after.squaredNorm(), kLeast, 1.0);
+        for (ContactImpulse& one : impulses)
+            if (one.contact.shell == static_cast<int>(k)) one.impulse *= share;
     }
 }
 

@@ -44,6 +44,8 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
         if (!unfiltered().allFinite()) return;
         const bool goOn = toTheEnd ? newton == 1 || improves(input) : overstretches(input, newton > 1);
         if (!goOn) return;
+        isTooLong = newton == 1 && mayBeInParts(input) && energyGain(input) > partOfStep * kMostEnergyGain;
+        if (isTooLong) return;
         if (const double gain = energyGain(input); gain < leastGain) {
             leastGain = gain;
             calmestStep = newton;
@@ -60,13 +62,26 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
     }
     const double mostGain = response.hasFastBody() && bodiesLead(input) ? kMostGainOfFast : kMostEnergyGain;
     if (!unfiltered().allFinite()) return;
-    const bool isAmongWalls = dynamicBodies.empty() && !input.bodies.empty();
-    if (isAmongWalls && energyGain(input) > partOfStep * kEnergyGainAlone && descend(input, report)) return;
+    if (isAmongWalls(input) && energyGain(input) > partOfStep * kEnergyGainAlone) {
+        isTooLong = mayBeInParts(input);
+        if (isTooLong || descend(input, report)) return;
+    }
     if (energyGain(input) > partOfStep * mostGain) limitDeformation(input, report);
 }
 
-/// Where Newton's method does not settle among walls: once more from standing still, which no contact forbids that only
-/// stops, and always downhill. So it gains no energy, wherever it ends. False if it did not come to that.
+bool IslandSolver::Impl::isAmongWalls(const IslandInput& input) const {
+    return dynamicBodies.empty() && !input.bodies.empty();
+}
+
+/// A sheet that comes down flat on the edge of a box: what is beyond goes on by more than its triangles are large, and
+/// no linearisation at either end of that knows of the other. Shorter steps do not go as far.
+bool IslandSolver::Impl::mayBeInParts(const IslandInput& input) const {
+    return mayBeShorter && isAmongWalls(input) && response.hasContacts() && !response.isAnyBouncy();
+}
+
+/// Where Newton's method does not settle among walls, nor in the shortest parts of a step: once more from standing
+/// still, which no contact forbids that only stops, and always downhill. So it gains no energy, wherever it ends. False
+/// if it did not come to that.
 bool IslandSolver::Impl::descend(const IslandInput& input, StepReport& report) {
     constexpr int kMostSteps = 20, kMostHalvings = 20;
     constexpr double kSettled = 1e-3;  // of what the first step brings
@@ -97,9 +112,19 @@ bool IslandSolver::Impl::descend(const IslandInput& input, StepReport& report) {
         first = std::max(first, gained);
         if (gained <= kSettled * first) break;
     }
-    system.start(v, freeTwist, u);
+    readImpulses(input);
     report.limited = true;
     return energyGain(input) <= partOfStep * kMostEnergyGain;
+}
+
+/// What contacts give with the present velocities, which no solve has led to: those of the last one may be hundreds of
+/// times as large, and its shells would have gone elsewhere.
+void IslandSolver::Impl::readImpulses(const IslandInput& input) {
+    assemble(input, true);
+    response.writeTo(system);
+    system.express(v, freeTwist, u);
+    pcg.computeResidual(system, u);
+    response.readImpulses(system, {v, u.w, unfiltered()});
 }
 
 /// After one more Newton step: goes back along it until the incremental potential is not above what it was, and says

@@ -179,18 +179,18 @@ TEST(Kinematic, AnAnchorIsWhereItsBodyIsInEveryStep) {
 /// Under a cloth. Parameters: shape, cells of the cloth's side.
 class KinematicCourse : public ::testing::TestWithParam<std::tuple<std::string, int>> {
   protected:
-    /// Deepest that the cloth stands inside, the median of five starts 10 um apart: in some a corner comes in for a
-    /// step. `z`: where the body is beside the course [m].
+    /// Deepest that the cloth stands inside, the median of nine starts 10 um apart: in some (of mesh, shaken, 15 of
+    /// 40) a corner comes in for a step. `z`: where the body is beside the course [m].
     static double medianDepth(const Course& course, double z) {
         const auto& [name, cells] = GetParam();
         const auto isMeant = [&](const Pusher& pusher) { return pusher.name == name; };
         const Pusher& pusher = *std::find_if(std::begin(kPushers), std::end(kPushers), isMeant);
         std::vector<double> depths;
-        for (int start = 0; start < 5; ++start)
+        for (int start = 0; start < 9; ++start)
             depths.push_back(
                 KinematicScene{materials::cotton(), course, pusher, cells, kStep, {1e-5 * start, 0, z}}.run().deepest);
         std::sort(depths.begin(), depths.end());
-        return depths[2];
+        return depths[4];
     }
 };
 

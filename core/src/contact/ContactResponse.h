@@ -48,6 +48,8 @@ class ContactResponse {
     /// Reads a solve. True when the active set, a linearisation or friction changed so that another solve is needed.
     /// `rough`: the solve was not to the tolerance.
     bool update(const CoupledSystem& system, const IslandVelocities& solved, const Points& y, int round, bool rough);
+    /// What contacts give with these velocities, and nothing else of update.
+    void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);
     /// Most negative gap that the last update predicted for the end of the step and that it wanted closed [m].
     double deepestGap() const { return m_deepestGap; }
     /// Whether nothing rests on the contacts and the shells give way: they are then looked at once, after a rough
@@ -60,6 +62,8 @@ class ContactResponse {
     bool isLast(int round) const { return round + 1 >= m_care.rounds; }
     /// Whether anything is near.
     bool hasContacts() const { return !m_touches.empty(); }
+    /// Whether some contact bounces.
+    bool isAnyBouncy() const;
     /// Moves vertices that end inside a body out of it, after finish. `v`: velocities of all vertices; `impulses`: what
     /// that took is added.
     void pushOut(Points& v, std::vector<ContactImpulse>& impulses);
@@ -203,12 +207,10 @@ class ContactResponse {
     bool isBetweenBodies(const Touch& touch) const;
     double pinchedMass(const Touch& touch) const;
     double vertexStiffness(const CoupledSystem& system, const Touch& touch) const;
-    void readImpulses(const CoupledSystem& system, const IslandVelocities& solved);
     void letGo(Touch& touch) const;
     bool releasePulling(int round);
     void raiseMultiplier(Touch& touch) const;
     double leavingSpeed(const Touch& touch) const;
-    bool isAnyBouncy() const;
     bool bounce(const IslandVelocities& solved);
     void addFriction(const Touch& touch, Mat3& damping, Vec3& load) const;
     bool updateFriction(const CoupledSystem& system);

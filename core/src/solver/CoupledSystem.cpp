@@ -75,12 +75,18 @@ void CoupledSystem::setContacts(const std::vector<VertexConstraint>& constraints
 }
 
 void CoupledSystem::start(const Points& v, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, CoupledVector& u) const {
+    express(v, w, u);
+    for (const auto& c : m_constraints) u.s.col(c.vertex) = (c.free * u.s.col(c.vertex) + c.z).eval();
+}
+
+void CoupledSystem::express(const Points& v, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w,
+                            CoupledVector& u) const {
     u.s = v;
     u.w = w;
     for (const auto& c : m_constraints) {
         Vec3 moved = c.carried;
         if (c.body >= 0) moved += pointVelocity(w.col(c.body), c.arm);
-        u.s.col(c.vertex) = c.free * (v.col(c.vertex) - c.tie * moved) + c.z;
+        u.s.col(c.vertex) -= c.tie * moved;
     }
 }
 

@@ -126,6 +126,8 @@ class CoupledSystem {
 
     /// u with (I - S) s = z, and s, w such that free vertices move with v and bodies with w.
     void start(const Points& v, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, CoupledVector& u) const;
+    /// The same whose velocities are v and w, whether (I - S) s = z or not.
+    void express(const Points& v, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, CoupledVector& u) const;
     /// Absolute velocities of the vertices.
     void velocities(const CoupledVector& u, Points& v) const;
     /// q = filtered operator applied to u (homogeneous: nothing carried).

@@ -74,9 +74,13 @@ double FilteredPcg::precondition(const CoupledSystem& system, const CoupledPreco
 
 double FilteredPcg::begin(const CoupledSystem& system, const CoupledPreconditioner& preconditioner,
                           const CoupledVector& u) {
+    computeResidual(system, u);
+    return precondition(system, preconditioner);
+}
+
+void FilteredPcg::computeResidual(const CoupledSystem& system, const CoupledVector& u) {
     resize(system);
     system.residual(u, m_r, m_unfiltered);
-    return precondition(system, preconditioner);
 }
 
 PcgReport FilteredPcg::finish(const CoupledSystem& system, const CoupledPreconditioner& preconditioner,

@@ -29,7 +29,9 @@ class FilteredPcg {
         begin(system, preconditioner, u);
         return finish(system, preconditioner, reference, tolerance, maxIterations, u);
     }
-    /// (b - A v) at every vertex as of the last call of either: at the u that it left.
+    /// Nothing but unfilteredResidual at any u.
+    void computeResidual(const CoupledSystem& system, const CoupledVector& u);
+    /// (b - A v) at every vertex as of the last call of any: at the u that it left.
     const Points& unfilteredResidual() const { return m_unfiltered; }
 
   private:
