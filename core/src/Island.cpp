@@ -37,13 +37,22 @@ const StepReport& IslandSolver::solve(const IslandInput& input) {
     if (!(input.h > 0.0) || !std::isfinite(input.h))
         throw std::invalid_argument("IslandInput.h [s] must be > 0 and finite");
     Impl& s = *m_impl;
-    s.mayBeShorter = StepParts::areAllowed(input);
-    s.attempt(input);
-    if (s.isWorthParts())
-        s.solveInParts(input);
-    else
-        s.store(input);
+    if (s.standing.find(input)) {
+        s.solve(s.standing.input());
+        s.standing.store();
+    } else {
+        s.solve(input);
+    }
     return s.lastReport;
+}
+
+void IslandSolver::Impl::solve(const IslandInput& input) {
+    mayBeShorter = StepParts::areAllowed(input);
+    attempt(input);
+    if (isWorthParts())
+        solveInParts(input);
+    else
+        store(input);
 }
 
 /// Everything but what others would see of it.

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "StandingBodies.h"
 #include "contact/ContactResponse.h"
 #include "jacket/Island.h"
 #include "solver/BodySupports.h"
@@ -29,6 +30,7 @@ struct IslandSolver::Impl {
     CoupledPreconditioner preconditioner;
     FilteredPcg pcg;
     BodySupports supports;
+    StandingBodies standing;
     ContactResponse response;
     std::vector<int> offsets, dynamicIndex;
     std::vector<int> dynamicBodies;  ///< index in IslandInput.bodies of each dynamic body
@@ -72,6 +74,7 @@ struct IslandSolver::Impl {
     WorkerTeam* teamFor(const IslandInput& input) const { return start.cols() < kLeastForTeam ? nullptr : input.team; }
 
     // Island.cpp: the course of a step, from what is given to what is stored
+    void solve(const IslandInput& input);
     void attempt(const IslandInput& input);
     bool isWorthParts() const;
     void solveInParts(const IslandInput& input);

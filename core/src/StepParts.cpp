@@ -21,9 +21,12 @@ Vec3 carriedAlong(const Vec3& point, const CoupledBody& body) {
 }  // namespace
 
 bool StepParts::areAllowed(const IslandInput& whole) {
-    return whole.contacts && !whole.inOnePiece && whole.couplings.empty() && whole.rigidContacts.empty() &&
-           std::all_of(whole.bodies.begin(), whole.bodies.end(),
-                       [](const CoupledBody& body) { return body.prescribed || body.supports.empty(); });
+    const auto isPrescribed = [](const CoupledBody& body) { return body.prescribed; };
+    const auto isLoose = [](const CoupledBody& body) { return body.prescribed || body.supports.empty(); };
+    if (!whole.contacts || whole.inOnePiece) return false;
+    if (std::all_of(whole.bodies.begin(), whole.bodies.end(), isPrescribed)) return true;
+    return whole.couplings.empty() && whole.rigidContacts.empty() &&
+           std::all_of(whole.bodies.begin(), whole.bodies.end(), isLoose);
 }
 
 StepParts::StepParts(const IslandInput& whole, const StepReport& failed)

@@ -1,10 +1,13 @@
 // What contact is to do by theory, over more sheets, places and steps than the tests have time for: metal that is laid
-// on boxes, sheets on an incline, boxes much smaller than the triangles that they fall on, bullets that come aslant.
+// on boxes, sheets that fall over crates or lie on an incline, boxes much smaller than the triangles that they fall on,
+// bullets that come aslant.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "support/Incline.h"
 #include "support/PlateScene.h"
@@ -47,9 +50,10 @@ bool isFaulty(const char* material, const PlateScene& scene) {
     if (fault)
         std::printf(
             "  %-9s %s of %g m, %d cells, on a %s box, %g mm aside, %g mm above, 1/%.0f s: %.2g mm deep, at most "
-            "%.2g m/s, %d steps unsettled\n",
+            "%.2g m/s, %d steps unsettled, the box shoved by %.2g mm\n",
             fault, material, scene.side, scene.cells, scene.boxMass > 0.0 ? "free" : "fixed", 1e3 * scene.aside,
-            1e3 * scene.above, 1.0 / scene.h, 1e3 * outcome.deepest, outcome.fastest, outcome.unsettled);
+            1e3 * scene.above, 1.0 / scene.h, 1e3 * outcome.deepest, outcome.fastest, outcome.unsettled,
+            1e3 * outcome.shoved);
     return fault;
 }
 
@@ -64,6 +68,19 @@ void runPlates() {
                             for (const double boxMass : {0.0, 20.0})
                                 tally.count(
                                     isFaulty(kind->name, {kind->material, side, cells, h, boxMass, aside, above}));
+}
+
+void runDrapes() {
+    for (const double boxMass : {0.0, 2.0, 20.0}) {
+        const std::string name = "sheets that fall flat on a crate of 30 cm, " + std::to_string(int(boxMass)) + " kg";
+        Tally tally(name.c_str());
+        for (const Named* kind : {&kCotton, &kPaper, &kRubber})
+            for (const int cells : {12, 24, 48})
+                for (const double above : {0.01, 0.1, 0.5})
+                    for (const double aside : {0.03, 0.041})
+                        tally.count(
+                            isFaulty(kind->name, {kind->material, 1.2, cells, 1.0 / 60, boxMass, aside, above, 0.3}));
+    }
 }
 
 /// A sheet that lies on an incline of 20 degrees.
@@ -191,13 +208,17 @@ void runShots() {
 
 int main(int argc, char** argv) {
     using namespace jacket::bullet::testing;
+    const std::pair<std::string, void (*)()> kinds[] = {{"plates", runPlates},
+                                                        {"drapes", runDrapes},
+                                                        {"inclines", runInclines},
+                                                        {"boxes", runSmallBoxes},
+                                                        {"shots", runShots}};
     const std::string only = argc > 1 ? argv[1] : "";
-    if (argc > 2 || (argc == 2 && only != "plates" && only != "inclines" && only != "boxes" && only != "shots")) {
-        std::fprintf(stderr, "usage: contact_bench [plates | inclines | boxes | shots]\n");
+    const auto isAsked = [&](const auto& kind) { return only.empty() || kind.first == only; };
+    if (argc > 2 || std::none_of(std::begin(kinds), std::end(kinds), isAsked)) {
+        std::fprintf(stderr, "usage: contact_bench [plates | drapes | inclines | boxes | shots]\n");
         return 2;
     }
-    if (only.empty() || only == "plates") runPlates();
-    if (only.empty() || only == "inclines") runInclines();
-    if (only.empty() || only == "boxes") runSmallBoxes();
-    if (only.empty() || only == "shots") runShots();
+    for (const auto& kind : kinds)
+        if (isAsked(kind)) kind.second();
 }

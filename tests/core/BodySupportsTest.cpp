@@ -97,13 +97,19 @@ TEST(BodySupports, WhatALiftedBodyRestedOnDoesNotHoldItBack) {
     EXPECT_LT(supports.respond(-lift, 1.0).norm(), 1e-3);  // pressed, it stays
 }
 
-TEST(BodySupports, AContactWithABodyOfPrescribedMotionDoesNothing) {
+TEST(BodySupports, ABodyThatStandsStillBearsTheOther) {
     const std::vector<CoupledBody> bodies{falling(1), falling(1)};
     BodySupports supports;
+    for (const std::vector<int>& dynamicIndex : {std::vector{-1, 0}, std::vector{0, -1}}) {
+        supports.begin(bodies, {}, std::vector{onTop(1e4)}, dynamicIndex);
+        ASSERT_EQ(supports.masses().size(), 1u);
+        EXPECT_TRUE(supports.couplings().empty());
+        const Vec6& row = dynamicIndex[0] < 0 ? onTop(1e4).rowB : onTop(1e4).rowA;
+        EXPECT_LT((supports.masses()[0] - bodies[1].mass - 1e4 * row * row.transpose()).norm(), 1e-9);
+    }
     supports.begin(bodies, {}, std::vector{onTop(1e4)}, {-1, 0});
-    ASSERT_EQ(supports.masses().size(), 1u);
-    EXPECT_EQ(supports.masses()[0], bodies[1].mass);
-    EXPECT_TRUE(supports.couplings().empty());
+    EXPECT_LT(supports.freeTwists()[0].norm(), 1e-3 * bodies[1].freeTwist.norm());  // it falls no more
+    EXPECT_LT((supports.ownMass(0) - bodies[1].mass).norm(), 1e-9);
 }
 
 }  // namespace

@@ -753,6 +753,90 @@ TEST(ContactStepTest, ASheetThatComesDownFlatGetsWhatItsContactsSay) {
     }
 }
 
+/// A ball that stands on something below it, or on nothing.
+void holdLast(Scene& scene, BodySupport& support, bool stands) {
+    CoupledBody& ball = scene.bodies.back();
+    support = {(Vec6() << Vec3::UnitY(), Vec3::Zero()).finished(), 0.0, 1e4 * ball.mass(0, 0)};
+    if (!stands) return;
+    ball.supports = {&support, 1};
+    ball.mass += support.weight * support.row * support.row.transpose();
+}
+
+/// What a sheet does in a step in which it meets a ball of so many times its mass; the ball moves by `speed`.
+Points metByBall(double ratio, bool stands, double speed, bool isWall, CoupledBody* after = nullptr) {
+    Scene scene = flatScene(false);
+    BodySupport support;
+    CoupledBody& ball = scene.bodies.back();
+    ball.prescribed = isWall;
+    ball.mass *= ratio * scene.shell.masses().sum();
+    holdLast(scene, support, stands && !isWall);
+    ball.freeTwist.head<3>() = Vec3(speed, 0, 0);
+    if (!stands) ball.freeTwist.head<3>() += kStep * kGravity;
+    SimpleContacts contacts(scene.bodies, scene.friction);
+    Shell* const shell = &scene.shell;
+    scene.solver.solve({.h = kStep, .shells = {&shell, 1}, .bodies = scene.bodies, .contacts = &contacts});
+    scene.shell.advance(kStep);
+    if (after) *after = ball;
+    return scene.shell.positions();
+}
+
+TEST(StandingBodies, AreWallsToShellsAndGetWhatTheyGive) {
+    const Points wall = metByBall(5.0, true, 0.0, true);
+    const auto isWall = [&](double ratio, bool stands, double speed) {
+        return (metByBall(ratio, stands, speed, false) - wall).cwiseAbs().maxCoeff() < 1e-9;
+    };
+    CoupledBody ball;
+    EXPECT_LT((metByBall(5.0, true, 0.0, false, &ball) - wall).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_LT(ball.impulse[1], -0.01);
+    EXPECT_EQ(ball.motion, Vec6::Zero());
+    EXPECT_TRUE(isWall(5.0, true, 0.005 * kStep * 9.81));
+    EXPECT_FALSE(isWall(5.0, true, 0.02 * kStep * 9.81)) << "it moves";
+    EXPECT_FALSE(isWall(3.0, true, 0.0)) << "it is light";
+    EXPECT_FALSE(isWall(5.0, false, 0.0)) << "it falls";
+}
+
+/// What lies on a shell is borne by it, whatever else seems to bear it: a ball on a sheet on a floor.
+TEST(StandingBodies, AreNotBorneByShells) {
+    Scene scene(Shell(makeGrid({.size = {1.0, 1.0}, .cells = {4, 4}}), materials::cotton(), {}));
+    for (int i = 0; i < scene.shell.vertexCount(); ++i) scene.shell.pin(i);
+    BodySupport support;
+    scene.addBall(5.0 * scene.shell.masses().sum(), 0.3, Vec3(0, 0.2999, 0), Vec3::Zero());
+    holdLast(scene, support, true);
+    CoupledBody& ball = scene.bodies[0];
+    const Vec6 free = -0.005 * kStep * 9.81 * (Vec6() << Vec3::UnitY(), Vec3::Zero()).finished();
+    SimpleContacts contacts(scene.bodies, 0.0);
+    Shell* const shell = &scene.shell;
+    for (int k = 0; k < 3; ++k) {
+        ball.freeTwist = free;
+        scene.solver.solve({.h = kStep, .shells = {&shell, 1}, .bodies = scene.bodies, .contacts = &contacts});
+        EXPECT_NE(ball.motion, Vec6::Zero());
+    }
+}
+
+/// One that lies on another, which stands, is borne by it all the same.
+TEST(StandingBodies, BearOthers) {
+    Scene scene = flatScene(false);
+    BodySupport support;
+    scene.bodies[0].prescribed = false;
+    scene.bodies[0].mass *= 5.0 * scene.shell.masses().sum();
+    holdLast(scene, support, true);
+    scene.addBall(0.1, 0.1, Vec3(0, 0.4, 0), Vec3::Zero());  // in the sheet's way, on the first
+    scene.bodies[0].freeTwist.setZero();
+    scene.bodies[1].freeTwist.head<3>() = kStep * kGravity;
+    const Vec6 up = (Vec6() << Vec3::UnitY(), Vec3::Zero()).finished();
+    const std::vector<RigidContact> between{{0, 1, -up, up, 1e3}};
+    SimpleContacts contacts(scene.bodies, scene.friction);
+    Points x = scene.shell.positions();
+    x.row(1).array() += 0.2;
+    scene.shell.setPositions(x);
+    Shell* const shell = &scene.shell;
+    scene.solver.solve(
+        {.h = kStep, .shells = {&shell, 1}, .bodies = scene.bodies, .rigidContacts = between, .contacts = &contacts});
+    EXPECT_EQ(scene.bodies[0].motion, Vec6::Zero());
+    EXPECT_LT(scene.bodies[1].impulse[1], -1e-3);       // the sheet presses it down
+    EXPECT_NEAR(scene.bodies[1].motion[1], 0.0, 1e-5);  // not one g h^2, 2.7 mm
+}
+
 TEST(ContactStepTest, GroundCarriesTheWeight) {
     for (const double friction : {0.0, 0.5}) {
         Scene scene = dropScene(friction);

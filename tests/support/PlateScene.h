@@ -4,7 +4,8 @@
 
 namespace jacket::bullet::testing {
 
-/// A sheet that is laid on a box of 60 cm, fixed or free on a floor: tests run some of them, contact_bench all.
+/// A sheet that is laid on a box, or falls on it, which is fixed or free on a floor: tests run some of them,
+/// contact_bench all.
 struct PlateScene {
     ShellMaterial material;
     double side;                       ///< of the sheet [m]
@@ -12,19 +13,22 @@ struct PlateScene {
     double h;                          ///< [s]
     double boxMass;                    ///< 0: fixed [kg]
     double aside = 0.0, above = 1e-3;  ///< of its middle beside the box's, and above its top [m]
+    double boxSide = 0.6;              ///< [m]
 
     SheetOutcome run() const {
-        constexpr double kHalf = 0.3, kSeconds = 2.0;  // of the box [m], [s]
+        constexpr double kSeconds = 2.0;
+        const btScalar half = btScalar(0.5 * boxSide);
         BulletScene scene;
         scene.addFloor();
-        auto& box = scene.addBox(btVector3(btScalar(kHalf), btScalar(kHalf), btScalar(kHalf)), boxMass,
-                                 btVector3(0, btScalar(kHalf), 0));
+        auto& box = scene.addBox(btVector3(half, half, half), boxMass, btVector3(0, half, 0));
         auto& sheet = scene.shells->add(squareSheet(side, cells), material, {.friction = 0.5});
-        place(sheet, {aside, 2.0 * kHalf + above, 0.7 * aside});
+        place(sheet, {aside, boxSide + above, 0.7 * aside});
         SheetOutcome outcome;
         for (double t = 0.0; t < kSeconds; t += h) {
             scene.step(h);
             outcome.note(scene, sheet, penetration(sheet, box));
+            outcome.shoved =
+                std::max(outcome.shoved, double(box.getWorldTransform().getOrigin().distance(btVector3(0, half, 0))));
         }
         return outcome;
     }

@@ -8,6 +8,7 @@ namespace jacket::bullet::testing {
 /// What a run was at worst, where no body moves faster than a walk and nothing falls from higher than 1 m.
 struct SheetOutcome {
     double deepest = 0.0, fastest = 0.0;  ///< the sheet, in a body [m], one of its vertices [m/s]
+    double shoved = 0.0;                  ///< how far a body was from where it stood, if that is asked for [m]
     int unsettled = 0;                    ///< steps
 
     /// After a step; `depth` of the sheet in bodies then [m].
@@ -21,6 +22,7 @@ struct SheetOutcome {
         if (deepest > 5e-4) return "deep";
         if (fastest > 5.0) return "thrown";
         if (unsettled > 5) return "unsettled";
+        if (shoved > 5e-3) return "shoved";
         return nullptr;
     }
 };

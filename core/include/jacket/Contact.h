@@ -42,8 +42,8 @@ struct BodyCoupling {
 };
 
 /// A rigid contact between two dynamic bodies of the island, which bore load when the step began: it keeps
-/// rowA . w_a + rowB . w_b from falling below zero, by a stiff term. Masses and free twists are given without it. With
-/// a body of prescribed motion it does nothing.
+/// rowA . w_a + rowB . w_b from falling below zero, by a stiff term. Masses and free twists are given without it. A
+/// body of prescribed motion must stand still.
 struct RigidContact {
     int a = 0, b = 0;          ///< bodies, a != b
     Vec6 rowA = Vec6::Zero();  ///< how fast it opens, from the twist of a

@@ -48,12 +48,25 @@ void BodySupports::begin(std::span<const CoupledBody> bodies, std::span<const Bo
     for (RigidContact contact : contacts) {
         contact.a = dynamicIndex[contact.a];
         contact.b = dynamicIndex[contact.b];
-        if (contact.a < 0 || contact.b < 0) continue;
+        if (contact.a < 0 || contact.b < 0) {
+            addSupport(contact);
+            continue;
+        }
         m_pairs.push_back({contact});
         m_couplings.push_back({contact.a, contact.b});
         add(m_pairs.back(), 1.0);
     }
     if (!m_pairs.empty()) solveFreeTwists();
+}
+
+/// One body of the pair stands still: it bears the other.
+void BodySupports::addSupport(const RigidContact& pair) {
+    const int body = std::max(pair.a, pair.b);
+    if (body < 0) return;
+    const Vec6& row = pair.a < 0 ? pair.rowB : pair.rowA;
+    m_supports.push_back({.body = body, .contact = {row, 0.0, pair.weight}});
+    m_mass[body] += pair.weight * row * row.transpose();
+    m_freeTwist[body] = m_mass[body].ldlt().solve(m_momentum[body]);
 }
 
 /// The term of the pair that m_couplings has at the same place, or takes it away.

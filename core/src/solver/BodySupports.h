@@ -43,6 +43,7 @@ class BodySupports {
         Hold hold{};
     };
 
+    void addSupport(const RigidContact& pair);
     void add(const Pair& pair, double sign);
     void findLoads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w);
     void solveFreeTwists();
