@@ -17,7 +17,7 @@ constexpr double kAtRest = 0.01;     // of the mean edge: a vertex that moves no
 constexpr double kSlowShell = 0.03;  // of sqrt(g L), L: the shell's side: no faster on average is what only flickers
 constexpr double kFall = 2e-4;       // of m g L: what loses less keeps its energy
 constexpr double kMostWait = 0.9;    // of gDeactivationTime: as far as a body that touches an awake shell gets
-constexpr double kSlow = 0.01;       // a body slower than this wakes no shell that it comes near [m/s]
+constexpr double kSlow = 0.01;       // a body slower than this stands, and wakes no shell that it comes near [m/s]
 
 bool samePose(const btTransform& a, const btTransform& b) {
     return (a.getOrigin() - b.getOrigin()).length2() < btScalar(1e-12) &&
@@ -40,6 +40,20 @@ bool sleeps(const btCollisionObject& object) {
 bool mayFallAsleep(const btCollisionObject& object) {
     if (btMultiBodyLinkCollider::upcast(&object)) return sleeps(object);
     return sleeps(object) || object.getDeactivationTime() >= btScalar(kMostWait) * gDeactivationTime;
+}
+
+/// Whether it never moves, or has not moved for a while.
+bool isQuiet(const btCollisionObject& object) {
+    if (object.isStaticOrKinematicObject()) return standsStill(object);
+    return btRigidBody::upcast(&object) && mayFallAsleep(object);
+}
+
+/// Whether it never moves, or is borne by rigid contacts and stands on them.
+bool stands(const Obstacle& obstacle) {
+    const CoupledBody& body = obstacle.body;
+    if (obstacle.object->isStaticOrKinematicObject()) return standsStill(*obstacle.object);
+    return !body.supports.empty() && body.startTwist.head<3>().norm() < kSlow &&
+           body.radius * body.startTwist.tail<3>().norm() < kSlow;
 }
 
 /// Left alone, Bullet would put it to sleep: it knows of no contact with the shell.
@@ -221,7 +235,7 @@ void Sleepers::followEnergy(const Candidate& candidate, const Vec3& gravity, dou
     const double waited = std::exchange(rest.level, 0.0);
     if (!isAsBefore || !candidate.shell->options().sleeping || candidate.supports.empty() ||
         !std::all_of(candidate.supports.begin(), candidate.supports.end(),
-                     [](const btCollisionObject* object) { return standsStill(*object); }))
+                     [](const btCollisionObject* object) { return isQuiet(*object); }))
         return;
     const double weightTimesSide = shell.masses().sum() * gravity.norm() * shell.side();
     const double kinetic = shell.kineticEnergy();
@@ -239,8 +253,7 @@ bool Sleepers::isCalm(const Island& island) {
         return shell->options().sleeping && shell->m_rest->level >= wait;
     };
     return !gDisableDeactivation && !island.pairs.empty() &&
-           std::all_of(island.obstacles.begin(), island.obstacles.end(),
-                       [](const Obstacle& obstacle) { return standsStill(*obstacle.object); }) &&
+           std::all_of(island.obstacles.begin(), island.obstacles.end(), stands) &&
            std::all_of(island.shells.begin(), island.shells.end(), isLevel);
 }
 

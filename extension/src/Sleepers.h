@@ -48,9 +48,9 @@ class Sleepers {
     void rest(const Vec3& gravity, double h);
     /// Together with the bodies that it touched.
     void wakeUp(ShellBody& shell);
-    /// Whether an island's shells are slow, have bodies around them that never move, and lose no energy: what moves
-    /// them still is what the solves of contacts leave over, as vertices go on leaving a body and coming back to it.
-    /// What truly falls, slides or swings loses some.
+    /// Whether an island's shells are slow, have bodies around them that never move, or stand, and lose no energy: what
+    /// moves them still is what the solves of contacts leave over, as vertices go on leaving a body and coming back to
+    /// it. What truly falls, slides or swings loses some.
     static bool isCalm(const Island& island);
 
   private:

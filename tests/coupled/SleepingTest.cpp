@@ -145,6 +145,23 @@ TEST(Sleeping, BoxesSleepWithTheClothUnderThem) {
     EXPECT_EQ(height, scene.right.getWorldTransform().getOrigin().y());
 }
 
+/// It flickers over a body that stands free as over one that never moves.
+TEST(Sleeping, AClothSleepsWithTheCrateThatItHangsOver) {
+    for (const double mass : {2.0, 20.0}) {
+        Scene scene;
+        scene.addFloor();
+        const btScalar half = btScalar(0.15);
+        auto& crate = scene.addBox(btVector3(half, half, half), mass, btVector3(0, half, 0));
+        auto& cloth = scene.shells->add(sheetAt(1.2, 12, 0.31), materials::cotton());
+        EXPECT_GT(timeToSleep(scene, cloth, 25.0), 0.0) << mass << " kg";
+        EXPECT_FALSE(crate.isActive());
+        crate.activate();
+        crate.setLinearVelocity(btVector3(btScalar(0.5), 0, 0));
+        scene.run(0.1, kStep);
+        EXPECT_FALSE(cloth.isAsleep());
+    }
+}
+
 /// What happens to a sleeping pile, and that this wakes the cloth.
 struct Alarm {
     const char* name;

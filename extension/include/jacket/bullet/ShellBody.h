@@ -38,7 +38,8 @@ struct ShellOptions {
     double contactThickness = -1.0;      ///< distance kept from surfaces [m]; < 0: half the shell's thickness
     Preconditioner preconditioner = Preconditioner::IncompleteCholesky;
     /// Whether it may fall asleep: once no vertex has moved by 1 % of an edge for a while. Over bodies that never move,
-    /// one that is slow and loses no energy is damped until they stay there, or sleeps as it is some seconds later.
+    /// or stand, one that is slow and loses no energy is damped until they stay there, or sleeps as it is some seconds
+    /// later.
     bool sleeping = true;
 };
 
