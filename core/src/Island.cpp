@@ -28,6 +28,12 @@ bool isToBeFactored(const Shell& shell, double h, bool isNearBodies, bool givesW
 
 }  // namespace
 
+double IslandInput::shellMass() const {
+    double sum = 0.0;
+    for (const Shell* shell : shells) sum += shell->masses().sum();
+    return sum;
+}
+
 IslandSolver::IslandSolver() : m_impl(std::make_unique<Impl>()) {}
 IslandSolver::~IslandSolver() = default;
 IslandSolver::IslandSolver(IslandSolver&&) noexcept = default;

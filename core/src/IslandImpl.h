@@ -96,6 +96,8 @@ struct IslandSolver::Impl {
     bool overstretches(const IslandInput& input, bool isAgain) const;
     void assemble(const IslandInput& input, bool atEnd);
     double linearTolerance(const IslandInput& input) const;
+    double leastTolerance(const IslandInput& input) const;
+    double enoughForBodies(const IslandInput& input) const;
     void readFreeTwists();
     double floorOfReference(const IslandInput& input, double share) const;
     bool mayFallIn(const IslandInput& input) const;

@@ -142,7 +142,7 @@ bool IslandSolver::Impl::giveToWalls(const IslandInput& input, int shell, const 
     const auto isWalls = [&](int ofShell, int body) {
         if (ofShell != shell) return false;
         const int dynamic = dynamicIndex[body];
-        return dynamic < 0 || supports.ownMass(dynamic).diagonal().head<3>().minCoeff() > least;
+        return dynamic < 0 || supports.lightest(dynamic) > least;
     };
     double pressed = 0.0;
     for (const ContactImpulse& one : impulses)

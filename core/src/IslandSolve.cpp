@@ -76,7 +76,7 @@ bool IslandSolver::Impl::isAmongWalls(const IslandInput& input) const {
 /// A sheet that comes down flat on the edge of a box: what is beyond goes on by more than its triangles are large, and
 /// no linearisation at either end of that knows of the other. Shorter steps do not go as far.
 bool IslandSolver::Impl::mayBeInParts(const IslandInput& input) const {
-    return mayBeShorter && isAmongWalls(input) && response.hasContacts() && !response.isAnyBouncy();
+    return mayBeShorter && !input.bodies.empty() && response.hasContacts() && !response.isAnyBouncy();
 }
 
 /// Where Newton's method does not settle among walls, nor in the shortest parts of a step: once more from standing
@@ -184,8 +184,7 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
         parts.push_back({&step.matrix, &step.rhs, offsets[k], &input.shells[k]->positions(), factored[k] != 0,
                          isIncomplete && !factored[k] && n >= kLeastCompact});
     }
-    // Bodies that rest on the solution feel what single precision leaves over: soft rows and stacks lose their balance.
-    const bool isSingle = dynamicBodies.empty() && !isAnyFactored() &&
+    const bool isSingle = (dynamicBodies.empty() || response.isQuickForBodies()) && !isAnyFactored() &&
                           linearTolerance(input) >= FilteredPcg::kLeastSingleTolerance && isIncomplete;
     system.begin(parts, static_cast<int>(start.cols()), supports.masses(), supports.freeTwists(), supports.couplings(),
                  isSingle ? Precision::Single : Precision::Double, team);
@@ -194,12 +193,34 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
     lap.addTo(times.assembly);
 }
 
-/// The least of the shells'. Bodies rest on the solution: what the solve leaves over is a force on them.
-double IslandSolver::Impl::linearTolerance(const IslandInput& input) const {
-    constexpr double kMostWithBodies = 1e-4;
+/// Of the shells'.
+double IslandSolver::Impl::leastTolerance(const IslandInput& input) const {
     double tolerance = input.shells[0]->settings().tolerance;
     for (const Shell* shell : input.shells) tolerance = std::min(tolerance, shell->settings().tolerance);
-    return dynamicBodies.empty() ? tolerance : std::min(kMostWithBodies, 0.1 * tolerance);
+    return tolerance;
+}
+
+/// Bodies that rest on shells rest on the solution: what the solve leaves over is a force on them.
+double IslandSolver::Impl::linearTolerance(const IslandInput& input) const {
+    constexpr double kMostWithBodies = 1e-4;
+    const double tolerance = leastTolerance(input);
+    return dynamicBodies.empty() || response.isQuickForBodies() ? tolerance
+                                                                : std::min(kMostWithBodies, 0.1 * tolerance);
+}
+
+/// Where bodies are solved for and shells move: what may be left over is as much less than how they move, and than what
+/// gravity does to the lightest body, as the tolerance says. At rest it is nothing.
+double IslandSolver::Impl::enoughForBodies(const IslandInput& input) const {
+    constexpr double kShare = 0.4;
+    if (dynamicBodies.empty() || preconditioner.isComplete()) return 0.0;
+    const double mass = input.shellMass(), tolerance = leastTolerance(input);
+    double lightest = mass;
+    for (int b = 0; b < std::ssize(dynamicBodies); ++b) lightest = std::min(lightest, supports.lightest(b));
+    const double enough = kShare * kShare * lightest / mass * floorOfReference(input, 1.0);
+    double motion = 0.0;
+    for (std::size_t k = 0; k < input.shells.size(); ++k)
+        motion += 2.0 * input.shells[k]->kineticEnergy(start.middleCols(offsets[k], input.shells[k]->vertexCount()));
+    return tolerance * tolerance * std::min(motion, enough);
 }
 
 void IslandSolver::Impl::readFreeTwists() {
@@ -210,10 +231,8 @@ void IslandSolver::Impl::readFreeTwists() {
 /// What gravity does in a step, so that a scene at rest is not solved to the last bit of nothing; a tenth of it where
 /// the preconditioner's norm makes little of what is left of it.
 double IslandSolver::Impl::floorOfReference(const IslandInput& input, double share) const {
-    double sum = 0.0;
-    for (const Shell* shell : input.shells) sum += shell->masses().sum();
     const double kick = share * input.h * std::max(input.gravity.norm(), 1e-6);
-    return sum * kick * kick;
+    return input.shellMass() * kick * kick;
 }
 
 /// Whether what a solve leaves over may be the weight of a shell that bodies alone hold: balance takes from it what no
@@ -245,7 +264,7 @@ PcgReport IslandSolver::Impl::solveOnce(const IslandInput& input, bool roughly, 
         system.start(*guess, guessTwist, u);
         rho = pcg.begin(system, preconditioner, u);
     }
-    double target2 = tolerance * tolerance * reference;
+    double target2 = std::max(tolerance * tolerance * reference, enoughForBodies(input));
     if (preconditioner.isComplete()) target2 = std::min(target2, kCompleteTolerance * kCompleteTolerance * rho);
     if (mayFallIn(input))
         target2 = std::clamp(floorOfReference(input, kMostOfGravity), kMostDigits * kMostDigits * target2, target2);

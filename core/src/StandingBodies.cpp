@@ -9,25 +9,14 @@ constexpr double kHeavy = 4.0;    // over all shells' mass
 constexpr double kStill = 0.01;   // of what gravity does in a step: what moves slower goes by less than contacts' slop
 constexpr double kLifted = 0.01;  // of its weight
 
-/// Along the axis where that is least, without what bears it [kg].
-double lightest(const CoupledBody& body) {
-    Vec3 mass = body.mass.diagonal().head<3>();
-    for (const BodySupport& support : body.supports) mass -= support.weight * support.row.head<3>().cwiseAbs2();
-    return mass.minCoeff();
-}
-
-double massOf(const IslandInput& input) {
-    double sum = 0.0;
-    for (const Shell* shell : input.shells) sum += shell->masses().sum();
-    return sum;
-}
-
 }  // namespace
 
 bool StandingBodies::find(const IslandInput& given) {
-    const double mass = massOf(given);
-    const auto isHeavy = [&](const CoupledBody& body) { return !body.prescribed && lightest(body) > kHeavy * mass; };
-    if (!given.contacts || std::none_of(given.bodies.begin(), given.bodies.end(), isHeavy)) {
+    const double least = kHeavy * given.shellMass();
+    const auto mayBeHeavy = [&](const CoupledBody& body) {
+        return !body.prescribed && body.mass.diagonal().head<3>().minCoeff() > least;  // with what bears it
+    };
+    if (!given.contacts || std::none_of(given.bodies.begin(), given.bodies.end(), mayBeHeavy)) {
         m_stood.clear();
         return false;
     }
@@ -37,8 +26,9 @@ bool StandingBodies::find(const IslandInput& given) {
     m_given = &given;
     for (std::size_t b = 0; b < m_bodies.size(); ++b) {
         const int body = static_cast<int>(b);
-        if (isHeavy(m_bodies[b]) && !m_isJoined[b] && stands(given, body) && !isOnShell(given, body))
-            m_bodies[b].prescribed = true;
+        const int dynamic = m_dynamicIndex[b];
+        if (dynamic < 0 || m_isJoined[b] || !(m_supports.lightest(dynamic) > least)) continue;
+        m_bodies[b].prescribed = stands(given, body) && !isOnShell(given, body);
     }
     const auto drops = [&](const RigidContact& c) {
         return dropUnborne(c.a, c.b, c.rowA) || dropUnborne(c.b, c.a, c.rowB);
@@ -75,7 +65,6 @@ bool StandingBodies::stands(const IslandInput& given, int body) const {
 /// Whether a shell lies between a body and what seems to bear it: to a rigid solver a sheet is nothing. None gets there
 /// while the body stands.
 bool StandingBodies::isOnShell(const IslandInput& given, int body) {
-    constexpr double kBelow = 0.5;  // cosine of the angle between a contact's normal and gravity
     if (std::find(m_stood.begin(), m_stood.end(), given.bodies[body].key) != m_stood.end()) return false;
     m_poses.clear();
     for (const Shell* shell : given.shells) m_poses.push_back(&shell->positions());
@@ -84,7 +73,7 @@ bool StandingBodies::isOnShell(const IslandInput& given, int body) {
     const double reach = given.h * given.h * given.gravity.norm();
     given.contacts->find({m_poses, m_still, 0.0}, reach, reach, m_found);
     return std::any_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
-        return contact.body == body && contact.normal.dot(given.gravity) > kBelow * given.gravity.norm();
+        return contact.body == body && isUnderBody(contact, given.gravity);
     });
 }
 
@@ -108,7 +97,8 @@ void StandingBodies::store() {
         given.impulse = m_bodies[b].impulse;
         given.motion = m_bodies[b].motion;
         const double lift = -given.impulse.head<3>().dot(kick);
-        if (m_bodies[b].prescribed && !given.prescribed && lift < kLifted * lightest(given) * kick.squaredNorm())
+        if (m_bodies[b].prescribed && !given.prescribed &&
+            lift < kLifted * m_supports.lightest(m_dynamicIndex[b]) * kick.squaredNorm())
             m_stood.push_back(given.key);
     }
 }

@@ -1,5 +1,6 @@
 #include "StepParts.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -7,6 +8,8 @@
 
 namespace jacket {
 namespace {
+
+constexpr double kSteady = 0.01;  // of what gravity does in a step: contacts that open no faster stay closed
 
 Mat3 turnOf(const Vec6& motion) {
     const Vec3 rotation = motion.tail<3>();
@@ -18,15 +21,37 @@ Vec3 carriedAlong(const Vec3& point, const CoupledBody& body) {
     return body.position + body.motion.head<3>() + turnOf(body.motion) * (point - body.position);
 }
 
+/// At the end of a part of a step, from how it moves when that begins. In the whole step it is `given`.
+Vec6 freeTwistOf(const CoupledBody& given, const Vec6& startTwist, double share) {
+    if (given.supports.empty()) return startTwist + share * (given.freeTwist - given.startTwist);
+    const Mat6 own = given.ownMass();
+    const Vec6 ofSupports = given.supportMomentum();
+    const Vec6 byForces = given.mass * given.freeTwist - ofSupports - own * given.startTwist;
+    return given.mass.ldlt().solve(own * startTwist + share * byForces + ofSupports);
+}
+
 }  // namespace
 
 bool StepParts::areAllowed(const IslandInput& whole) {
     const auto isPrescribed = [](const CoupledBody& body) { return body.prescribed; };
-    const auto isLoose = [](const CoupledBody& body) { return body.prescribed || body.supports.empty(); };
     if (!whole.contacts || whole.inOnePiece) return false;
     if (std::all_of(whole.bodies.begin(), whole.bodies.end(), isPrescribed)) return true;
-    return whole.couplings.empty() && whole.rigidContacts.empty() &&
-           std::all_of(whole.bodies.begin(), whole.bodies.end(), isLoose);
+    const double most = kSteady * whole.h * whole.gravity.norm();
+    const auto stays = [most](double opening) { return std::abs(opening) <= most; };
+    const auto isBorneEvenly = [&](const CoupledBody& body) {
+        return body.prescribed ||
+               std::all_of(body.supports.begin(), body.supports.end(), [&](const BodySupport& support) {
+                   return stays(support.row.dot(body.startTwist) - support.velocity) &&
+                          stays(support.row.dot(body.freeTwist) - support.velocity);
+               });
+    };
+    const auto keepsClosed = [&](const RigidContact& pair) {
+        const CoupledBody &a = whole.bodies[pair.a], &b = whole.bodies[pair.b];
+        return stays(pair.rowA.dot(a.startTwist) + pair.rowB.dot(b.startTwist)) &&
+               stays(pair.rowA.dot(a.freeTwist) + pair.rowB.dot(b.freeTwist));
+    };
+    return whole.couplings.empty() && std::all_of(whole.bodies.begin(), whole.bodies.end(), isBorneEvenly) &&
+           std::all_of(whole.rigidContacts.begin(), whole.rigidContacts.end(), keepsClosed);
 }
 
 StepParts::StepParts(const IslandInput& whole, const StepReport& failed)
@@ -73,7 +98,7 @@ void StepParts::begin() {
     for (std::size_t b = 0; b < m_bodies.size(); ++b) {
         const CoupledBody& given = m_whole.bodies[b];
         if (given.prescribed) continue;
-        m_bodies[b].freeTwist = m_bodies[b].startTwist + m_part.h / m_whole.h * (given.freeTwist - given.startTwist);
+        m_bodies[b].freeTwist = freeTwistOf(given, m_bodies[b].startTwist, m_part.h / m_whole.h);
     }
     for (std::size_t k = 0; k < m_start.size(); ++k) {
         Shell& shell = *m_whole.shells[k];

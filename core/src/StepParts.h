@@ -16,7 +16,8 @@ class StepParts {
     /// `failed`: what the attempt at the whole step cost. `whole` must outlive this.
     StepParts(const IslandInput& whole, const StepReport& failed);
     ~StepParts();
-    /// Whether a step may be taken in parts: what joins free bodies, or bears them, is known for whole steps only.
+    /// Whether a step may be taken in parts: what joins free bodies is known for whole steps only, and so is what they
+    /// come to lie on.
     static bool areAllowed(const IslandInput& whole);
 
     const IslandInput& next() const { return m_part; }

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <vector>
 
+#include "support/FreeScenes.h"
 #include "support/HardScenes.h"
 #include "support/PlateScene.h"
 #include "support/Random.h"
@@ -198,6 +199,24 @@ TEST_P(ClothOverACrate, LiesOverItAndLeavesItWhereItStands) {
 }
 INSTANTIATE_TEST_SUITE_P(Cells, ClothOverACrate,
                          ::testing::Combine(::testing::Values(16, 36), ::testing::Values(0.0, 2.0, 20.0)));
+
+/// The same over a ball that may roll away, of about the cloth's mass and of ten times it [kg].
+class ClothOverABall : public ::testing::TestWithParam<double> {};
+
+TEST_P(ClothOverABall, LiesOverIt) {
+    const FreeScene scene = free_scenes::ballUnderCloth("cloth over a ball", GetParam());
+    int faults = 0;
+    for (int start = 0; start < 3; ++start) {
+        const FreeScene::Run run = scene.run(materials::cotton(), 48, start);
+        faults += run.isFaulty ? 1 : 0;
+        EXPECT_LT(run.outcome.deepest, 1.5e-3) << "start " << start;
+        EXPECT_LT(run.outcome.fastest, scene.fastest) << "start " << start;
+        EXPECT_LE(run.outcome.unsettled, 10) << "start " << start;
+        EXPECT_LT(run.solves, 8 * run.steps) << "start " << start;
+    }
+    EXPECT_LE(faults, 1);
+}
+INSTANTIATE_TEST_SUITE_P(Mass, ClothOverABall, ::testing::Values(0.3, 3.0));
 
 /// Three flat boxes fall a little into a sheet that is held along two edges, and stay a stack.
 TEST(Stack, StandsInAHammock) {

@@ -31,6 +31,21 @@ struct CoupledBody {
     Vec6 twist = Vec6::Zero();    ///< out: solved twist at the end of the step, to the solve's tolerance
     Vec6 impulse = Vec6::Zero();  ///< out: what the shells gave it, exactly, about its centre of mass [N s, N m s]
     Vec6 motion = Vec6::Zero();   ///< out: how it moves in the step: displacement and rotation vector [m, rad]
+
+    /// Without the stiff terms of its supports.
+    Mat6 ownMass() const {
+        Mat6 own = mass;
+        for (const BodySupport& support : supports) own -= support.weight * support.row * support.row.transpose();
+        return own;
+    }
+    /// Its own, along the axis where it is least [kg].
+    double lightest() const { return ownMass().diagonal().head<3>().minCoeff(); }
+    /// What those terms add to its momentum when it moves freely.
+    Vec6 supportMomentum() const {
+        Vec6 sum = Vec6::Zero();
+        for (const BodySupport& support : supports) sum += support.weight * support.velocity * support.row;
+        return sum;
+    }
 };
 
 /// An off-diagonal block of the bodies' common mass matrix: joints, or rigid contacts, make the momentum of one body

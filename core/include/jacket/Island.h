@@ -23,6 +23,8 @@ struct IslandInput {
     double restingSpeed = 0.2;    ///< contacts that close no faster do not bounce [m/s]
     double (*clock)() = nullptr;  ///< [s]; null: no times are taken
     WorkerTeam* team = nullptr;   ///< shares the work of large islands; the same bits with and without
+
+    double shellMass() const;  ///< of all shells [kg]
 };
 
 /// Solves for the velocities of one step: A v = b with contacts as filter, bodies as six unknowns each (see

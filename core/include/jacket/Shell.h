@@ -33,9 +33,10 @@ struct ShellSettings {
     BendingModel bending = PatchBending{};
     Integrator integrator = Integrator::BackwardEuler;
     Preconditioner preconditioner = Preconditioner::IncompleteCholesky;  ///< of an island: its first shell's
-    /// Of the linear solve, relative, in the preconditioner's norm. Where bodies that a shell can move take part, a
-    /// tenth of it, and at most 1e-4. Near bodies what is left of a shell without pins is also at most a tenth of
-    /// what gravity does in the step, or a hundredth of the tolerance.
+    /// Of the linear solve, relative, in the preconditioner's norm. Where shells bear bodies a tenth of it, and at most
+    /// 1e-4, while they are at rest; where they move, at most 0.4 of it of what gravity does in the step. Near bodies
+    /// what is left of a shell without pins is also at most a tenth of what gravity does in the step, or a hundredth of
+    /// the tolerance.
     double tolerance = 1e-2;
     int maxIterations = 1000;  ///< of one linear solve
     bool plasticity = false;   ///< keep bends and stretches beyond the material's yield stress

@@ -399,9 +399,10 @@ void ContactResponse::findPushes(const Points& v) {
 /// that is not known [m].
 double ContactResponse::gapBefore(const Touch& touch) const {
     const Contact& contact = touch.contact;
+    Vec3 carried = carriedOf(touch);
+    if (touch.dynamicBody >= 0) carried += pointVelocity(m_endTwists[contact.body], touch.arm);
     const Vec3 move = m_end[contact.shell].col(contact.vertices[0]) -
-                      m_input.shells[contact.shell]->positions().col(contact.vertices[0]) -
-                      m_input.h * carriedOf(touch);
+                      m_input.shells[contact.shell]->positions().col(contact.vertices[0]) - m_input.h * carried;
     const double gap = touch.startGap + move.dot(contact.normal) - touch.offset - touch.allowedGap;
     if (!std::isnan(gap)) return gap;
     return touch.active ? 0.0 : std::numeric_limits<double>::infinity();

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "Room.h"
+#include "solver/BodySupports.h"
 
 namespace jacket {
 namespace {
@@ -154,11 +155,9 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     }
     for (const auto& anchor : input.anchors) m_held[m_offsets[anchor.shell] + anchor.vertex] = 1;
     findChords();
+    m_bearsNoBody = false;
     if (!input.contacts) return;
 
-    const Care inFull = hasFreeBodies() ? kInFull : kAtLength;
-    m_care = isAmongWalls() && !isAnyStiff() && numbering.givesWay ? kAmongWalls : inFull;
-    if (numbering.isAnyFactored || m_onlyStops) m_care = kAtLength;
     m_creep = creepSpeed();
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);
     m_faceSlop = std::min(2e-4, 1e-2 * shortest);
@@ -170,6 +169,10 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     for (const Shell* shell : input.shells) m_startPoses.push_back(&shell->positions());
     m_still.assign(input.bodies.size(), Vec6::Zero());
     findAtStart(reach);
+    const Care inFull = hasFreeBodies() ? kInFull : kAtLength;
+    m_bearsNoBody = hasFreeBodies() && areBorneByOthers();
+    m_care = (isAmongWalls() || m_bearsNoBody) && !isAnyStiff() && numbering.givesWay ? kAmongWalls : inFull;
+    if (numbering.isAnyFactored || m_onlyStops) m_care = kAtLength;
     dropPassed();
     findRoomBesideFaces();
     findHeirs();
@@ -209,6 +212,25 @@ bool ContactResponse::hasFreeBodies() const {
 }
 
 /// Whether nothing rests on the contacts or is thrown by them, and nothing squeezes a shell.
+/// Whether rigid contacts bear every free body, none is lighter than the shells, and no shell bears one. Among walls
+/// that stand still.
+bool ContactResponse::areBorneByOthers() const {
+    const double mass = m_input.shellMass();
+    const auto isInPair = [&](int body) {
+        return std::any_of(m_input.rigidContacts.begin(), m_input.rigidContacts.end(),
+                           [body](const RigidContact& pair) { return pair.a == body || pair.b == body; });
+    };
+    for (std::size_t b = 0; b < m_input.bodies.size(); ++b) {
+        const CoupledBody& body = m_input.bodies[b];
+        const bool isBorne = !body.supports.empty() || isInPair(static_cast<int>(b));
+        const bool isWall = body.prescribed && body.freeTwist.isZero(0.0);
+        if (!isWall && (body.prescribed || !isBorne || body.lightest() < mass)) return false;
+    }
+    return std::none_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
+        return !m_input.bodies[contact.body].prescribed && isUnderBody(contact, m_input.gravity);
+    });
+}
+
 bool ContactResponse::isAmongWalls() const {
     if (m_input.bodies.size() == 1) return m_input.bodies[0].prescribed;
     return std::all_of(m_input.bodies.begin(), m_input.bodies.end(),

@@ -58,6 +58,8 @@ class ContactResponse {
     bool isQuick() const { return m_care.rounds <= kAmongWalls.rounds; }
     /// By what pushOut would move vertices, of which some stay where they are [m].
     const std::pmr::map<int, Vec3>& pushes(const Points& v);
+    /// Whether that is so although there are free bodies: rigid contacts bear them.
+    bool isQuickForBodies() const { return m_bearsNoBody && isQuick(); }
     /// Whether a round is the last one that may be.
     bool isLast(int round) const { return round + 1 >= m_care.rounds; }
     /// Whether anything is near.
@@ -233,6 +235,7 @@ class ContactResponse {
     double slowest() const { return 1e-3 * m_input.h * std::max(m_input.gravity.norm(), 1e-3); }
     bool hasFreeBodies() const;
     bool isAmongWalls() const;
+    bool areBorneByOthers() const;
     bool isAnyStiff() const;
     double creepSpeed() const;
     void findAtEnd(const IslandVelocities& solved, const Points& y);
@@ -282,6 +285,7 @@ class ContactResponse {
     std::pmr::set<int> m_forgotten{&m_pool};  ///< bodies
     Care m_care = kInFull;
     double m_vertexSlop = 0.0, m_faceSlop = 0.0, m_deepestGap = 0.0;
+    bool m_bearsNoBody = false;  ///< while there are free ones
     double m_creep = 0.0;  ///< sliding speed below which friction may hold less than its limit, where isQuick() [m/s]
     int m_frictionRounds = 0, m_mostFrictionRounds = 0;
     std::vector<VertexFilter> m_filters;

@@ -11,11 +11,6 @@ constexpr double kPull = 1e-2;   // of a body's weight, or of what is pressed on
                                  // that pulls less may stay for the step
 constexpr int kMostReturns = 1;  // a contact that has let go twice stays away: it closes in the bodies' own step
 
-/// Along the axis where that is least [kg].
-double lightest(const Mat6& mass) {
-    return mass.diagonal().head<3>().minCoeff();
-}
-
 }  // namespace
 
 void BodySupports::begin(std::span<const CoupledBody> bodies, std::span<const BodyCoupling> couplings,
@@ -31,9 +26,7 @@ void BodySupports::begin(std::span<const CoupledBody> bodies, std::span<const Bo
         if (dynamicIndex[b] < 0) continue;
         for (const BodySupport& contact : bodies[b].supports)
             m_supports.push_back({.body = dynamicIndex[b], .contact = contact});
-        m_ownMass.push_back(bodies[b].mass);
-        for (const BodySupport& contact : bodies[b].supports)
-            m_ownMass.back() -= contact.weight * contact.row * contact.row.transpose();
+        m_ownMass.push_back(bodies[b].ownMass());
         m_mass.push_back(bodies[b].mass);
         m_momentum.push_back(bodies[b].mass * bodies[b].freeTwist);
         m_freeTwist.push_back(bodies[b].freeTwist);
@@ -116,6 +109,10 @@ void BodySupports::solveTwists(std::vector<Vec6>& momenta) {
         momenta[b] = place[b] >= 0 ? Vec6(momentum.segment<6>(place[b])) : Vec6(m_mass[b].ldlt().solve(momenta[b]));
 }
 
+double BodySupports::lightest(int body) const {
+    return m_ownMass[body].diagonal().head<3>().minCoeff();
+}
+
 bool BodySupports::Hold::turn(double opening, double most) {
     const bool turns = holds ? opening > most : opening < 0.0;
     if (!turns || (!holds && returns == kMostReturns)) return false;
@@ -147,7 +144,7 @@ bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, dou
     for (Support& support : m_supports) {
         const auto& [row, velocity, weight] = support.contact;
         const double opening = row.dot(w.col(support.body)) - velocity;
-        const double pull = kPull * std::max(lightest(m_ownMass[support.body]) * kick, load[support.body]);
+        const double pull = kPull * std::max(lightest(support.body) * kick, load[support.body]);
         if (!support.hold.turn(opening, pull / weight)) continue;
         const double sign = support.hold.holds ? 1.0 : -1.0;
         m_mass[support.body] += sign * weight * row * row.transpose();
@@ -158,8 +155,7 @@ bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, dou
     for (Pair& pair : m_pairs) {
         const auto& [a, b, rowA, rowB, weight] = pair.contact;
         const double opening = rowA.dot(w.col(a)) + rowB.dot(w.col(b));
-        const double pull = kPull * std::max(std::min(lightest(m_ownMass[a]), lightest(m_ownMass[b])) * kick,
-                                             std::min(load[a], load[b]));
+        const double pull = kPull * std::max(std::min(lightest(a), lightest(b)) * kick, std::min(load[a], load[b]));
         if (!pair.hold.turn(opening, pull / weight)) continue;
         add(pair, pair.hold.holds ? 1.0 : -1.0);
         changed = true;

@@ -8,6 +8,12 @@
 
 namespace jacket {
 
+/// Whether a shell that meets a body there is under it.
+inline bool isUnderBody(const Contact& contact, const Vec3& gravity) {
+    constexpr double kBelow = 0.5;  // cosine of the angle between the contact's normal and gravity
+    return contact.normal.dot(gravity) > kBelow * gravity.norm();
+}
+
 /// Masses and free twists of an island's dynamic bodies with those of their rigid contacts that hold. A shell may lift
 /// a body off what carries it: the contact then lets go, or the shell would have to move the ground with it.
 class BodySupports {
@@ -23,6 +29,7 @@ class BodySupports {
                                                             double kick);
     const std::vector<Mat6>& masses() const { return m_mass; }
     const Mat6& ownMass(int body) const { return m_ownMass[body]; }  ///< without what bears it
+    double lightest(int body) const;                                 ///< its own, along the axis where it is least [kg]
     const std::vector<Vec6>& freeTwists() const { return m_freeTwist; }
     const std::vector<BodyCoupling>& couplings() const { return m_couplings; }
 

@@ -1,0 +1,150 @@
+#pragma once
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "support/HardScenes.h"
+#include "support/SheetOutcome.h"
+
+namespace jacket::bullet::testing {
+
+using Bodies = std::vector<btRigidBody*>;
+
+/// A sheet of 1.2 m among bodies that move freely: tests run some, free_bodies_bench all.
+struct FreeScene {
+    /// What a run has cost, and been at worst.
+    struct Run {
+        SheetOutcome outcome;
+        bool isFaulty = false;
+        int steps = 0, solves = 0, iterations = 0;
+        double seconds = 0.0, longest = 0.0;  ///< of all steps, of one [s]
+    };
+
+    const char* name;
+    double lasts;    ///< [s]
+    double fastest;  ///< a vertex that moves faster was thrown [m/s]
+    std::function<ShellBody&(BulletScene&, const ShellMaterial&, int cells, const Vec3& aside, Bodies&)> make;
+
+    /// From one of several starts, which a few millimetres tell apart.
+    Run run(const ShellMaterial& material, int cells, int start, double h = kStep) const {
+        using Clock = std::chrono::steady_clock;
+        BulletScene scene;
+        scene.addFloor();
+        Bodies bodies;
+        auto& sheet = make(scene, material, cells, {0.007 * start, 0.0, 0.005 * (start % 3)}, bodies);
+        Run run;
+        for (double t = 0.0; t < lasts; t += h) {
+            const auto before = Clock::now();
+            scene.step(h);
+            const double seconds = std::chrono::duration<double>(Clock::now() - before).count();
+            run.seconds += seconds;
+            run.longest = std::max(run.longest, seconds);
+            run.solves += scene.shells->lastStep().solves;
+            run.iterations += scene.shells->lastStep().pcgIterations;
+            double depth = 0.0;
+            for (const btRigidBody* body : bodies) depth = std::max(depth, penetration(sheet, *body));
+            run.outcome.note(scene, sheet, depth);
+            ++run.steps;
+        }
+        const SheetOutcome& outcome = run.outcome;
+        run.isFaulty = outcome.deepest > 5e-4 || outcome.fastest > fastest || outcome.unsettled > 5;
+        return run;
+    }
+};
+
+namespace free_scenes {
+
+constexpr double kSide = 1.2;  ///< of the sheets [m]
+
+inline ShellBody& addSheet(BulletScene& scene, const ShellMaterial& material, int cells, const Vec3& at) {
+    auto& sheet = scene.shells->add(squareSheet(kSide, cells), material, {.friction = 0.5});
+    place(sheet, at);
+    return sheet;
+}
+
+inline btVector3 moved(double x, double y, double z, const Vec3& by) {
+    return {btScalar(x + by.x()), btScalar(y + by.y()), btScalar(z + by.z())};
+}
+
+inline btRigidBody& addBall(BulletScene& scene, double radius, double mass, const btVector3& at) {
+    return scene.addBody(std::make_unique<btSphereShape>(btScalar(radius)), mass, at);
+}
+
+inline FreeScene ballUnderCloth(const char* name, double mass) {
+    return {name, 3.0, 6.0,
+            [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
+                bodies.push_back(&addBall(scene, 0.2, mass, btVector3(0, btScalar(0.2), 0)));
+                return addSheet(scene, material, cells, Vec3(0.05, 0.45, 0.03) + aside);
+            }};
+}
+
+inline FreeScene pileUnderCloth(const char* name, double mass) {
+    return {name, 3.0, 6.0,
+            [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
+                constexpr btScalar half = btScalar(0.1);
+                for (const auto& [x, y] : {std::pair{-0.21, 0.1}, {0.0, 0.1}, {0.21, 0.1}, {-0.1, 0.3}, {0.11, 0.3}})
+                    bodies.push_back(&scene.addBox(btVector3(half, half, half), mass, moved(x, y, 0, Vec3::Zero())));
+                return addSheet(scene, material, cells, Vec3(0.05, 0.55, 0.03) + aside);
+            }};
+}
+
+inline FreeScene onTrampoline(const char* name, bool isBox, double mass) {
+    return {name, 3.0, 6.0,
+            [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
+                constexpr btScalar half = btScalar(0.1);
+                const btVector3 at = moved(0.03, 1.4, 0.05, aside);
+                bodies.push_back(isBox ? &scene.addBox(btVector3(half, half, half), mass, at)
+                                       : &addBall(scene, half, mass, at));
+                auto& sheet = addSheet(scene, material, cells, {0, 1, 0});
+                pinBorder(sheet);
+                return sheet;
+            }};
+}
+
+inline FreeScene boxesInHammock(const char* name, double mass) {
+    return {name, 3.0, 6.0,
+            [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
+                constexpr btScalar half = btScalar(0.07);
+                for (int i = 0; i < 6; ++i) {
+                    const btVector3 at = moved(-0.2 + 0.2 * (i % 3), 1.1 + 0.2 * (i / 3), 0.03 * i - 0.1, aside);
+                    bodies.push_back(&scene.addBox(btVector3(half, half, half), mass, at));
+                }
+                auto& sheet = addSheet(scene, material, cells, {0, 1, 0});
+                for (int i = 0; i < sheet.vertexCount(); ++i) {
+                    const Vec3 x = sheet.shell().positions().col(i);
+                    if (std::min(std::abs(x.x()), std::abs(x.z())) > 0.49 * kSide) sheet.pin(i);
+                }
+                return sheet;
+            }};
+}
+
+inline FreeScene ballAtCurtain(const char* name, double mass) {
+    return {name, 2.0, 12.0,
+            [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
+                bodies.push_back(&addBall(scene, 0.1, mass, moved(0.03, 1.3, -1.0, aside)));
+                bodies.back()->setLinearVelocity(btVector3(0, 1, 6));
+                TriangleMesh mesh = squareSheet(kSide, cells);
+                for (int i = 0; i < mesh.positions.cols(); ++i)
+                    mesh.positions.col(i) = Vec3(mesh.positions(0, i), 1.3 + mesh.positions(2, i), 0.0);
+                auto& sheet = scene.shells->add(mesh, material, {.friction = 0.5});
+                for (int i = 0; i < sheet.vertexCount(); ++i)
+                    if (sheet.shell().positions()(1, i) > 1.3 + 0.49 * kSide) sheet.pin(i);
+                return sheet;
+            }};
+}
+
+inline FreeScene fallingTogether(const char* name, double mass) {
+    return {name, 2.0, 6.0,
+            [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
+                constexpr btScalar half = btScalar(0.1);
+                bodies.push_back(&scene.addBox(btVector3(half, half, half), mass, moved(0, 1.2, 0, aside)));
+                return addSheet(scene, material, cells, {0, 0.8, 0});
+            }};
+}
+
+}  // namespace free_scenes
+}  // namespace jacket::bullet::testing
