@@ -89,7 +89,7 @@ struct IslandSolver::Impl {
     // IslandSolve.cpp: the solve, linearised as often as it takes, and in rounds with the contacts
     void solveStep(const IslandInput& input, StepReport& report);
     bool isAmongWalls(const IslandInput& input) const;
-    bool mayBeInParts(const IslandInput& input) const;
+    bool mayBeInParts() const;
     bool descend(const IslandInput& input, StepReport& report);
     void readImpulses(const IslandInput& input);
     bool improves(const IslandInput& input);

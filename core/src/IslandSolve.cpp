@@ -44,7 +44,7 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
         if (!unfiltered().allFinite()) return;
         const bool goOn = toTheEnd ? newton == 1 || improves(input) : overstretches(input, newton > 1);
         if (!goOn) return;
-        isTooLong = newton == 1 && mayBeInParts(input) && energyGain(input) > partOfStep * kMostEnergyGain;
+        isTooLong = newton == 1 && mayBeInParts() && energyGain(input) > partOfStep * kMostEnergyGain;
         if (isTooLong) return;
         if (const double gain = energyGain(input); gain < leastGain) {
             leastGain = gain;
@@ -63,7 +63,7 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
     const double mostGain = response.hasFastBody() && bodiesLead(input) ? kMostGainOfFast : kMostEnergyGain;
     if (!unfiltered().allFinite()) return;
     if (isAmongWalls(input) && energyGain(input) > partOfStep * kEnergyGainAlone) {
-        isTooLong = mayBeInParts(input);
+        isTooLong = mayBeInParts();
         if (isTooLong || descend(input, report)) return;
     }
     if (energyGain(input) > partOfStep * mostGain) limitDeformation(input, report);
@@ -75,8 +75,8 @@ bool IslandSolver::Impl::isAmongWalls(const IslandInput& input) const {
 
 /// A sheet that comes down flat on the edge of a box: what is beyond goes on by more than its triangles are large, and
 /// no linearisation at either end of that knows of the other. Shorter steps do not go as far.
-bool IslandSolver::Impl::mayBeInParts(const IslandInput& input) const {
-    return mayBeShorter && !input.bodies.empty() && response.hasContacts() && !response.isAnyBouncy();
+bool IslandSolver::Impl::mayBeInParts() const {
+    return mayBeShorter && response.hasContacts() && !response.isAnyBouncy();
 }
 
 /// Where Newton's method does not settle among walls, nor in the shortest parts of a step: once more from standing

@@ -13,10 +13,8 @@ constexpr double kLifted = 0.01;  // of its weight
 
 bool StandingBodies::find(const IslandInput& given) {
     const double least = kHeavy * given.shellMass();
-    const auto mayBeHeavy = [&](const CoupledBody& body) {
-        return !body.prescribed && body.mass.diagonal().head<3>().minCoeff() > least;  // with what bears it
-    };
-    if (!given.contacts || std::none_of(given.bodies.begin(), given.bodies.end(), mayBeHeavy)) {
+    const auto isHeavy = [&](const CoupledBody& body) { return !body.prescribed && body.lightest() > least; };
+    if (!given.contacts || std::none_of(given.bodies.begin(), given.bodies.end(), isHeavy)) {
         m_stood.clear();
         return false;
     }
@@ -26,9 +24,8 @@ bool StandingBodies::find(const IslandInput& given) {
     m_given = &given;
     for (std::size_t b = 0; b < m_bodies.size(); ++b) {
         const int body = static_cast<int>(b);
-        const int dynamic = m_dynamicIndex[b];
-        if (dynamic < 0 || m_isJoined[b] || !(m_supports.lightest(dynamic) > least)) continue;
-        m_bodies[b].prescribed = stands(given, body) && !isOnShell(given, body);
+        if (isHeavy(m_bodies[b]) && !m_isJoined[b] && stands(given, body) && !isOnShell(given, body))
+            m_bodies[b].prescribed = true;
     }
     const auto drops = [&](const RigidContact& c) {
         return dropUnborne(c.a, c.b, c.rowA) || dropUnborne(c.b, c.a, c.rowB);
@@ -97,8 +94,7 @@ void StandingBodies::store() {
         given.impulse = m_bodies[b].impulse;
         given.motion = m_bodies[b].motion;
         const double lift = -given.impulse.head<3>().dot(kick);
-        if (m_bodies[b].prescribed && !given.prescribed &&
-            lift < kLifted * m_supports.lightest(m_dynamicIndex[b]) * kick.squaredNorm())
+        if (m_bodies[b].prescribed && !given.prescribed && lift < kLifted * given.lightest() * kick.squaredNorm())
             m_stood.push_back(given.key);
     }
 }

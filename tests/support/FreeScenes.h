@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
-#include <memory>
 #include <utility>
 #include <vector>
 
@@ -14,12 +13,11 @@ namespace jacket::bullet::testing {
 
 using Bodies = std::vector<btRigidBody*>;
 
-/// A sheet of 1.2 m among bodies that move freely: tests run some, free_bodies_bench all.
+/// A sheet of 1.2 m among bodies that move freely: tests run some, free_bench all.
 struct FreeScene {
     /// What a run has cost, and been at worst.
     struct Run {
         SheetOutcome outcome;
-        bool isFaulty = false;
         int steps = 0, solves = 0, iterations = 0;
         double seconds = 0.0, longest = 0.0;  ///< of all steps, of one [s]
     };
@@ -50,8 +48,6 @@ struct FreeScene {
             run.outcome.note(scene, sheet, depth);
             ++run.steps;
         }
-        const SheetOutcome& outcome = run.outcome;
-        run.isFaulty = outcome.deepest > 5e-4 || outcome.fastest > fastest || outcome.unsettled > 5;
         return run;
     }
 };
@@ -70,14 +66,10 @@ inline btVector3 moved(double x, double y, double z, const Vec3& by) {
     return {btScalar(x + by.x()), btScalar(y + by.y()), btScalar(z + by.z())};
 }
 
-inline btRigidBody& addBall(BulletScene& scene, double radius, double mass, const btVector3& at) {
-    return scene.addBody(std::make_unique<btSphereShape>(btScalar(radius)), mass, at);
-}
-
 inline FreeScene ballUnderCloth(const char* name, double mass) {
     return {name, 3.0, 6.0,
             [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
-                bodies.push_back(&addBall(scene, 0.2, mass, btVector3(0, btScalar(0.2), 0)));
+                bodies.push_back(&scene.addSphere(0.2, mass, btVector3(0, btScalar(0.2), 0)));
                 return addSheet(scene, material, cells, Vec3(0.05, 0.45, 0.03) + aside);
             }};
 }
@@ -87,7 +79,8 @@ inline FreeScene pileUnderCloth(const char* name, double mass) {
             [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
                 constexpr btScalar half = btScalar(0.1);
                 for (const auto& [x, y] : {std::pair{-0.21, 0.1}, {0.0, 0.1}, {0.21, 0.1}, {-0.1, 0.3}, {0.11, 0.3}})
-                    bodies.push_back(&scene.addBox(btVector3(half, half, half), mass, moved(x, y, 0, Vec3::Zero())));
+                    bodies.push_back(
+                        &scene.addBox(btVector3(half, half, half), mass, btVector3(btScalar(x), btScalar(y), 0)));
                 return addSheet(scene, material, cells, Vec3(0.05, 0.55, 0.03) + aside);
             }};
 }
@@ -98,7 +91,7 @@ inline FreeScene onTrampoline(const char* name, bool isBox, double mass) {
                 constexpr btScalar half = btScalar(0.1);
                 const btVector3 at = moved(0.03, 1.4, 0.05, aside);
                 bodies.push_back(isBox ? &scene.addBox(btVector3(half, half, half), mass, at)
-                                       : &addBall(scene, half, mass, at));
+                                       : &scene.addSphere(half, mass, at));
                 auto& sheet = addSheet(scene, material, cells, {0, 1, 0});
                 pinBorder(sheet);
                 return sheet;
@@ -125,7 +118,7 @@ inline FreeScene boxesInHammock(const char* name, double mass) {
 inline FreeScene ballAtCurtain(const char* name, double mass) {
     return {name, 2.0, 12.0,
             [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
-                bodies.push_back(&addBall(scene, 0.1, mass, moved(0.03, 1.3, -1.0, aside)));
+                bodies.push_back(&scene.addSphere(0.1, mass, moved(0.03, 1.3, -1.0, aside)));
                 bodies.back()->setLinearVelocity(btVector3(0, 1, 6));
                 TriangleMesh mesh = squareSheet(kSide, cells);
                 for (int i = 0; i < mesh.positions.cols(); ++i)

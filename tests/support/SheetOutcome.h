@@ -17,10 +17,10 @@ struct SheetOutcome {
         fastest = std::max(fastest, sheet.shell().velocities().colwise().norm().maxCoeff());
         unsettled += scene.shells->lastStep().settled ? 0 : 1;
     }
-    /// What is wrong, null if nothing is.
-    const char* fault() const {
+    /// What is wrong, null if nothing is. `mostSpeed`: above which a vertex was thrown [m/s].
+    const char* fault(double mostSpeed = 5.0) const {
         if (deepest > 5e-4) return "deep";
-        if (fastest > 5.0) return "thrown";
+        if (fastest > mostSpeed) return "thrown";
         if (unsettled > 5) return "unsettled";
         if (shoved > 5e-3) return "shoved";
         return nullptr;

@@ -211,26 +211,25 @@ bool ContactResponse::hasFreeBodies() const {
     return std::any_of(m_dynamicIndex.begin(), m_dynamicIndex.end(), [](int body) { return body >= 0; });
 }
 
-/// Whether nothing rests on the contacts or is thrown by them, and nothing squeezes a shell.
 /// Whether rigid contacts bear every free body, none is lighter than the shells, and no shell bears one. Among walls
 /// that stand still.
 bool ContactResponse::areBorneByOthers() const {
     const double mass = m_input.shellMass();
-    const auto isInPair = [&](int body) {
-        return std::any_of(m_input.rigidContacts.begin(), m_input.rigidContacts.end(),
-                           [body](const RigidContact& pair) { return pair.a == body || pair.b == body; });
+    const auto isBorne = [&](int b) {
+        return !m_input.bodies[b].supports.empty() ||
+               std::any_of(m_input.rigidContacts.begin(), m_input.rigidContacts.end(),
+                           [b](const RigidContact& pair) { return pair.a == b || pair.b == b; });
     };
-    for (std::size_t b = 0; b < m_input.bodies.size(); ++b) {
+    for (int b = 0; b < std::ssize(m_input.bodies); ++b) {
         const CoupledBody& body = m_input.bodies[b];
-        const bool isBorne = !body.supports.empty() || isInPair(static_cast<int>(b));
-        const bool isWall = body.prescribed && body.freeTwist.isZero(0.0);
-        if (!isWall && (body.prescribed || !isBorne || body.lightest() < mass)) return false;
+        if (body.prescribed ? !body.freeTwist.isZero(0.0) : !isBorne(b) || body.lightest() < mass) return false;
     }
     return std::none_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
         return !m_input.bodies[contact.body].prescribed && isUnderBody(contact, m_input.gravity);
     });
 }
 
+/// Whether nothing rests on the contacts or is thrown by them, and nothing squeezes a shell.
 bool ContactResponse::isAmongWalls() const {
     if (m_input.bodies.size() == 1) return m_input.bodies[0].prescribed;
     return std::all_of(m_input.bodies.begin(), m_input.bodies.end(),

@@ -56,10 +56,10 @@ class ContactResponse {
     /// solve if that is by far cheaper, again only where a contact pulls by much or a vertex ends deep inside a body,
     /// and pushOut does what is left.
     bool isQuick() const { return m_care.rounds <= kAmongWalls.rounds; }
-    /// By what pushOut would move vertices, of which some stay where they are [m].
-    const std::pmr::map<int, Vec3>& pushes(const Points& v);
     /// Whether that is so although there are free bodies: rigid contacts bear them.
     bool isQuickForBodies() const { return m_bearsNoBody && isQuick(); }
+    /// By what pushOut would move vertices, of which some stay where they are [m].
+    const std::pmr::map<int, Vec3>& pushes(const Points& v);
     /// Whether a round is the last one that may be.
     bool isLast(int round) const { return round + 1 >= m_care.rounds; }
     /// Whether anything is near.
