@@ -48,12 +48,25 @@ bool isQuiet(const btCollisionObject& object) {
     return btRigidBody::upcast(&object) && mayFallAsleep(object);
 }
 
-/// Whether it never moves, or is borne by rigid contacts and stands on them.
-bool stands(const Obstacle& obstacle) {
-    const CoupledBody& body = obstacle.body;
+/// Whether a rigid contact of an island bears one of its bodies on another one.
+bool liesOnAnother(const Island& island, int body, const Vec3& gravity) {
+    constexpr double kBeside = 0.1;  // cosine of the angle between the contact's normal and gravity
+    const double least = kBeside * gravity.norm();
+    return std::any_of(island.rigidContacts.begin(), island.rigidContacts.end(), [&](const RigidContact& pair) {
+        return (pair.a == body && -pair.rowA.head<3>().dot(gravity) > least) ||
+               (pair.b == body && -pair.rowB.head<3>().dot(gravity) > least);
+    });
+}
+
+/// Whether it never moves, or is borne by rigid contacts and stands on them. (Of bodies that are borne by one another
+/// the lowest one has another support.)
+bool stands(const Island& island, int body, const Vec3& gravity) {
+    const Obstacle& obstacle = island.obstacles[body];
+    const CoupledBody& coupled = obstacle.body;
     if (obstacle.object->isStaticOrKinematicObject()) return standsStill(*obstacle.object);
-    return !body.supports.empty() && body.startTwist.head<3>().norm() < kSlow &&
-           body.radius * body.startTwist.tail<3>().norm() < kSlow;
+    return coupled.startTwist.head<3>().norm() < kSlow &&
+           coupled.radius * coupled.startTwist.tail<3>().norm() < kSlow &&
+           (!coupled.supports.empty() || liesOnAnother(island, body, gravity));
 }
 
 /// Left alone, Bullet would put it to sleep: it knows of no contact with the shell.
@@ -247,14 +260,17 @@ void Sleepers::followEnergy(const Candidate& candidate, const Vec3& gravity, dou
     rest.level = (hasFallen ? 0.0 : waited) + h;
 }
 
-bool Sleepers::isCalm(const Island& island) {
+bool Sleepers::isCalm(const Island& island, const Vec3& gravity) {
     const double wait = waitForCalm();
     const auto isLevel = [&](const ShellBody* shell) {
         return shell->options().sleeping && shell->m_rest->level >= wait;
     };
-    return !gDisableDeactivation && !island.pairs.empty() &&
-           std::all_of(island.obstacles.begin(), island.obstacles.end(), stands) &&
-           std::all_of(island.shells.begin(), island.shells.end(), isLevel);
+    if (gDisableDeactivation || island.pairs.empty() ||
+        !std::all_of(island.shells.begin(), island.shells.end(), isLevel))
+        return false;
+    for (int b = 0; b < std::ssize(island.obstacles); ++b)
+        if (!stands(island, b, gravity)) return false;
+    return true;
 }
 
 /// A shell stays awake with any body that it touches, and that with any shell that it touches.

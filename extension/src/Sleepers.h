@@ -51,7 +51,7 @@ class Sleepers {
     /// Whether an island's shells are slow, have bodies around them that never move, or stand, and lose no energy: what
     /// moves them still is what the solves of contacts leave over, as vertices go on leaving a body and coming back to
     /// it. What truly falls, slides or swings loses some.
-    static bool isCalm(const Island& island);
+    static bool isCalm(const Island& island, const Vec3& gravity);
 
   private:
     struct Candidate {

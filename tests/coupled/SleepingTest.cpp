@@ -6,8 +6,10 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "support/BulletScene.h"
+#include "support/FreeScenes.h"
 
 namespace jacket::bullet::testing {
 namespace {
@@ -160,6 +162,27 @@ TEST(Sleeping, AClothSleepsWithTheCrateThatItHangsOver) {
         scene.run(0.1, kStep);
         EXPECT_FALSE(cloth.isAsleep());
     }
+}
+
+/// What lies on another body has no support of its own. (Lighter boxes topple under the cloth.)
+TEST(Sleeping, AClothSleepsWithThePileThatItHangsOver) {
+    int asleep = 0;
+    for (int start = 0; start < 3; ++start) {
+        Scene scene;
+        scene.addFloor();
+        std::vector<btRigidBody*> boxes;
+        auto& cloth = free_scenes::pileUnderCloth("boxes", 2.0)
+                          .make(scene, materials::cotton(), 16, Vec3(0.007 * start, 0, 0.005 * start), boxes);
+        asleep += timeToSleep(scene, cloth, 25.0) > 0.0 ? 1 : 0;
+        if (!cloth.isAsleep()) continue;
+        scene.run(1.0, kStep);
+        EXPECT_TRUE(cloth.isAsleep());
+        boxes.back()->activate();
+        boxes.back()->setLinearVelocity(btVector3(btScalar(0.5), 0, 0));
+        scene.run(0.1, kStep);
+        EXPECT_FALSE(cloth.isAsleep());
+    }
+    EXPECT_GE(asleep, 2);
 }
 
 /// What happens to a sleeping pile, and that this wakes the cloth.
