@@ -72,11 +72,13 @@ struct ShellContacts::Query {
     const Points& x;
     Frame frame;  ///< of the obstacle
     double vertexReach, faceReach;
-    bool isConvex;  ///< the obstacle is one piece
+    const double* ownReach;  ///< of each vertex, null: all have vertexReach
+    bool isConvex;           ///< the obstacle is one piece
     std::vector<Contact>& contacts;
     WorkerTeam* team;  ///< null: the shell is too small to be shared
     WorkerTeam* teamFor(const ConvexPiece& piece) const { return piece.asksShape() ? nullptr : team; }
     double thickness() const { return shellBody.contactThickness(); }
+    double reachOf(int vertex) const { return ownReach ? std::min(vertexReach, ownReach[vertex]) : vertexReach; }
     bool wantsFaces() const { return faceReach > -std::numeric_limits<double>::infinity(); }
 };
 
@@ -115,6 +117,7 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
                     moved(m_start[body], pose.twists[body], pose.time),
                     std::min(vertexReach, obstacle.body.inner),  // beyond that its nearest point says nothing
                     faceReach,
+                    pose.vertexReach.empty() ? nullptr : pose.vertexReach[shell],
                     obstacle.shape->pieces.size() == 1 && obstacle.shape->concave.empty(),
                     contacts,
                     m_shells[shell]->vertexCount() < kLeastToShare ? nullptr : m_team};
@@ -199,7 +202,7 @@ void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
         for (int i = begin; i < end; ++i) {
             if (m_memory.outside[i]) continue;
             const Vec3 x = toBody * Vec3(query.x.col(i));
-            const auto surface = piece.touch(x, query.vertexReach + query.thickness());
+            const auto surface = piece.touch(x, query.reachOf(i) + query.thickness());
             if (!surface) continue;
             const bool isOnIt = std::abs(surface->distance) < kOnSurface * query.thickness();
             append(found, {i, isOnIt ? besideSheet(query, piece, i, *surface) : *surface});
@@ -260,7 +263,7 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
         std::vector<SurfacePoint> touched;
         for (int i = begin; i < end; ++i) {
             touched.clear();
-            patch->touch(Vec3(x.col(i)), reach, depth, touched);
+            patch->touch(Vec3(x.col(i)), query.reachOf(i) + query.thickness(), depth, touched);
             for (const SurfacePoint& surface : touched) append(found, {i, place(surface)});
         }
     };

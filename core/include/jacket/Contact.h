@@ -109,6 +109,8 @@ struct ContactPose {
     std::span<const Points* const> positions;  ///< one per shell of the island
     std::span<const Vec6> twists;              ///< one per body
     double time;                               ///< 0 at the start of the step, h at its end [s]
+    /// Optional, one per shell: of each of its vertices, from where on it need not be found [m].
+    std::span<const double* const> vertexReach{};
 };
 
 /// A motion through one step: straight for vertices, with constant twists for bodies.

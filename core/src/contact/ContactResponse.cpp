@@ -145,13 +145,12 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     m_filters.clear();
     m_filterOf.assign(y.cols(), -1);
     m_edge.clear();
-    double shortest = 1e300, speed = 0.0;
+    double shortest = 1e300;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         for (int i = 0; i < shell.vertexCount(); ++i) m_held[m_offsets[k] + i] = shell.isPinned(i) || shell.isGuided(i);
         m_edge.push_back(shell.meanEdge());
         shortest = std::min(shortest, m_edge.back());
-        speed = std::max(speed, shell.velocities().colwise().norm().maxCoeff());
     }
     for (const auto& anchor : input.anchors) m_held[m_offsets[anchor.shell] + anchor.vertex] = 1;
     findChords();
@@ -161,14 +160,10 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     m_creep = creepSpeed();
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);
     m_faceSlop = std::min(2e-4, 1e-2 * shortest);
-    for (const auto& body : input.bodies)
-        speed = std::max(speed, body.freeTwist.head<3>().norm() + body.freeTwist.tail<3>().norm() * body.radius);
-    const double reach = 2.0 * input.h * (speed + input.h * input.gravity.norm()) + 10.0 * m_vertexSlop;
-
     m_startPoses.clear();
     for (const Shell* shell : input.shells) m_startPoses.push_back(&shell->positions());
     m_still.assign(input.bodies.size(), Vec6::Zero());
-    findAtStart(reach);
+    findAtStart(findReach());
     const Care inFull = hasFreeBodies() ? kInFull : kAtLength;
     m_bearsNoBody = hasFreeBodies() && areBorneByOthers();
     m_care = (isAmongWalls() || m_bearsNoBody) && !isAnyStiff() && numbering.givesWay ? kAmongWalls : inFull;
@@ -185,13 +180,35 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     keepEarliest();
 }
 
+/// How far off a body each vertex may be and yet come to it in the step, by twice as much as it is known to move now;
+/// the farthest of all [m]. What comes from farther off is found where it ends.
+double ContactResponse::findReach() {
+    double speed = 0.0, most = 0.0;
+    for (const auto& body : m_input.bodies)
+        speed = std::max(speed, body.freeTwist.head<3>().norm() + body.freeTwist.tail<3>().norm() * body.radius);
+    m_reach.resize(m_expected->cols());
+    m_reachOf.clear();
+    for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
+        const Points& v = m_input.shells[k]->velocities();
+        double* const reach = m_reach.data() + m_offsets[k];
+        m_reachOf.push_back(reach);
+        for (int i = 0; i < v.cols(); ++i) {
+            const double own =
+                std::sqrt(std::max(v.col(i).squaredNorm(), m_expected->col(m_offsets[k] + i).squaredNorm()));
+            reach[i] = 2.0 * m_input.h * (own + speed + m_input.h * m_input.gravity.norm()) + 10.0 * m_vertexSlop;
+            most = std::max(most, reach[i]);
+        }
+    }
+    return most;
+}
+
 /// What is near at the start of the step, into m_found. Faces are looked for where the last step held any, and as far
 /// as vertices where free bodies meet surfaces, or come: known by walls, by pins everywhere and by stiff shells before
 /// anything is found, else by the vertices that are.
 void ContactResponse::findAtStart(double reach) {
     const auto find = [&](double faceReach) {
         m_found.clear();
-        m_input.contacts->find({m_startPoses, m_still, 0.0}, reach, faceReach, m_found);
+        m_input.contacts->find({m_startPoses, m_still, 0.0, m_reachOf}, reach, faceReach, m_found);
     };
     m_found.clear();
     m_backed.clear();

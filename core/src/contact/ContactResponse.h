@@ -184,6 +184,7 @@ class ContactResponse {
     void sweepToEnd();
     bool closeFirst(int round);
     bool closePassed(const Contact& contact, int round);
+    double findReach();
     void findAtStart(double reach);
     void findRoomBesideFaces();
     void findComing();
@@ -267,12 +268,14 @@ class ContactResponse {
     std::pmr::map<Key, int> m_index{&m_pool};
     std::pmr::map<Key, Memory> m_memory{&m_pool};
     double m_memoryStep = 0.0;
-    std::vector<char> m_held;       ///< pinned or anchored
-    std::vector<double> m_edge;     ///< mean edge length of each shell [m]
-    std::vector<Points> m_end;      ///< where the solved motion ends, of each shell
-    std::vector<Vec6> m_endTwists;  ///< of each body
-    std::vector<char> m_fast;       ///< per body: may pass a shell within the step
-    std::vector<char> m_comes;      ///< per body: see findComing
+    std::vector<char> m_held;              ///< pinned or anchored
+    std::vector<double> m_reach;           ///< of each vertex: see findReach [m]
+    std::vector<const double*> m_reachOf;  ///< where that of each shell begins
+    std::vector<double> m_edge;            ///< mean edge length of each shell [m]
+    std::vector<Points> m_end;             ///< where the solved motion ends, of each shell
+    std::vector<Vec6> m_endTwists;         ///< of each body
+    std::vector<char> m_fast;              ///< per body: may pass a shell within the step
+    std::vector<char> m_comes;             ///< per body: see findComing
     bool m_anyFast = false;
     std::vector<char> m_stiff;  ///< per shell: has pins and is stiff as a whole, beside free bodies
     bool m_onlyStops = false;   ///< see Numbering
