@@ -71,7 +71,7 @@ class World {
     int rejectedSteps() const;     ///< since the start
     int unconvergedSteps() const;  ///< since the start: a solve used up its iterations, or a contact ended too deep
     int unsettledSteps() const;    ///< since the start: contacts used up their rounds
-    int passedSteps() const;       ///< since the start: those in which a fast body went through a shell or may have
+    int passedSteps() const;       ///< since the start: those in which a body went through a shell or may have
     bool isAsleep(int shell) const;
 
     std::vector<std::string> takeWarnings();

@@ -87,7 +87,7 @@ void IslandSolver::Impl::attempt(const IslandInput& input) {
     if (!report.finite) return;
     if (!dynamicBodies.empty()) limitBodies(input, report);
     LapTimer closing(input);
-    report.passed = response.passes({v, endTwists(), unfiltered()}, y);
+    report.passed = response.passes({v, endTwists(), unfiltered()}, y, unsettled || report.limited);
     closing.addTo(report.times.contact);
     report.settled = !unsettled;
     report.mayPass = response.hasFastBody() && (report.limited || unsettled);

@@ -29,12 +29,14 @@ class ShellContacts final : public ContactDetector {
                   std::span<const std::pair<int, int>> pairs, Memory& memory, WorkerTeam* team = nullptr);
     void find(const ContactPose& pose, double vertexReach, double faceReach, std::vector<Contact>& contacts) override;
     void sweep(const ContactSweep& motion, std::vector<Contact>& contacts) override;
+    bool crosses(const ContactSweep& motion) override;
     void advance(std::span<const Vec6> twists, double time) override;
 
   private:
     struct Query;
     struct Sweep;
     void sweepPiece(const Sweep& sweep, const SweepTarget& target, std::vector<Contact>& contacts);
+    void boundChunks(const HalfEdgeMesh& mesh, const Points& start, const Points& end);
     const TrianglePatch& wholeOf(const ConcavePiece& piece, double radius);
     static Contact makeContact(const Query& query, int feature, const SurfacePoint& surface,
                                const std::array<int, 3>& vertices, const Vec3& weights);
@@ -96,6 +98,7 @@ class ShellContacts::Memory {
     std::vector<std::vector<Face>> foundFaces;
     std::vector<unsigned char> outside;  ///< per vertex: which sides of the obstacle's box it lies beyond
     std::vector<Candidate> candidates;
+    std::vector<Bounds> chunks;      ///< see boundChunks
     std::vector<SurfacePoint> kept;  ///< of one vertex
     std::vector<int> sides;          ///< which of its sides each of them is
 };

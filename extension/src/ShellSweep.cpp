@@ -247,7 +247,7 @@ const TrianglePatch& ShellContacts::patchOf(int pair, std::size_t concave, const
 void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& contacts) {
     for (int pair = 0; pair < int(m_pairs.size()); ++pair) {
         const auto [shell, body] = m_pairs[pair];
-        if (!motion.fast[body]) continue;
+        if (!motion.bodies[body]) continue;
         const Obstacle& obstacle = m_obstacles[body];
         const Sweep sweep{*m_shells[shell], *motion.start[shell], *motion.end[shell], obstacle,
                           m_start[body],    motion.twists[body],  motion.time};

@@ -53,6 +53,12 @@ class TimedDetector : public ContactDetector {
         m_detector.sweep(motion, contacts);
         m_sum += seconds() - start;
     }
+    bool crosses(const ContactSweep& motion) override {
+        const double start = seconds();
+        const bool any = m_detector.crosses(motion);
+        m_sum += seconds() - start;
+        return any;
+    }
     void advance(std::span<const Vec6> twists, double time) override { m_detector.advance(twists, time); }
 
   private:

@@ -11,7 +11,7 @@
 
 #include "support/Incline.h"
 #include "support/PlateScene.h"
-#include "support/Random.h"
+#include "support/SmallBox.h"
 #include "support/Target.h"
 
 namespace jacket::bullet::testing {
@@ -129,33 +129,13 @@ void runInclines() {
                 }
 }
 
-/// A box of 1 to 3 cm that falls on a pinned sheet of 1 m with cells of 20 to 50 cm, turned any way: whether it ends
-/// below the sheet and no step said that it may have passed.
+/// Whether a box ends below the sheet and no step said that it may have passed.
 bool isSmallBoxLost(unsigned seed, const Named& of) {
-    Random random(seed);
-    BulletScene scene;
-    const int cells = 2 + random.below(4);
-    auto& sheet = scene.shells->add(squareSheet(1.0, cells), of.material, {.friction = 0.5});
-    pinBorder(sheet);
-    const btVector3 half = random.vector(Vec3::Constant(5e-3), Vec3::Constant(0.015));
-    const double mass = random.logBetween(5e-3, 2.0), speed = random.between(0.5, 8.0);
-    auto& box = scene.addBox(half, mass, random.vector({-0.4, 0.03, -0.4}, {0.4, 0.15, 0.4}));
-    const btVector3 turn = random.vector(Vec3::Constant(-3.0), Vec3::Constant(3.0));
-    box.setWorldTransform(btTransform(btQuaternion(turn.x(), turn.y(), turn.z()), box.getWorldTransform().getOrigin()));
-    box.setLinearVelocity(random.vector({-1, -speed, -1}, {1, -speed, 1}));
-    const double h = seed % 2 == 0 ? 1.0 / 60 : 1.0 / 240;
-    double lowest = 0.0;
-    for (double t = 0.0; t < 2.0; t += h) {
-        scene.step(h);
-        lowest = std::min(lowest, sheet.shell().positions().row(1).minCoeff());
-    }
-    const Vec3 end = toVec3(box.getWorldTransform().getOrigin());
-    const bool isBelow = end.y() < lowest - 0.05 && std::max(std::abs(end.x()), std::abs(end.z())) < 0.5;
-    const bool isLost = isBelow && scene.shells->lastStep().passedSteps == 0;
-    if (isLost)
-        std::printf("  lost      box %u of %.2g kg, %.2g m/s on %s, %d cells, 1/%.0f s\n", seed, mass, speed, of.name,
-                    cells, 1.0 / h);
-    return isLost;
+    const SmallBox box(seed, of.material);
+    if (box.isBelow)
+        std::printf("  %-9s box %u of %.2g kg, %.2g m/s on %s, %d cells, 1/%.0f s\n", box.isSaid ? "(said)" : "lost",
+                    seed, box.mass, box.speed, of.name, box.cells, 1.0 / box.h);
+    return box.isBelow && !box.isSaid;
 }
 
 void runSmallBoxes() {

@@ -1,6 +1,7 @@
 // What shells and rigid bodies do to each other. Figures to compare with follow from momentum, weight and free fall.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <tuple>
 
@@ -45,9 +46,11 @@ class MassRatio : public ::testing::TestWithParam<std::tuple<double, double, int
         if (ratio > 1e5) cloth.stretchStiffnessOverride = 1e5;
         return cloth;
     }
-    /// Whether the ball is above what it stretches lowest.
-    static bool isOn(const ShellBody& sheet, const btRigidBody& ball) {
-        return double(ball.getWorldTransform().getOrigin().y()) > sheet.shell().positions().row(1).minCoeff();
+    /// Whether the ball is above what it stretches lowest, or has rolled or been thrown off the sheet.
+    static bool isOnOrBeside(const ShellBody& sheet, const btRigidBody& ball) {
+        const Vec3 at = toVec3(ball.getWorldTransform().getOrigin());
+        return at.y() > sheet.shell().positions().row(1).minCoeff() ||
+               std::max(std::abs(at.x()), std::abs(at.z())) > 1.0;
     }
 };
 
@@ -68,11 +71,7 @@ TEST_P(MassRatio, TheBallNeverLeavesFasterThanFreeFallBroughtIt) {
         ASSERT_LT(0.5 * rise * rise + 9.81 * x.y(), 9.81 * height + 0.5 * std::pow(9.81 * h, 2) + 1e-6)
             << "at " << t << " s";
     }
-    // Not of the lightest balls in the longest steps: of 20 starts 10 to 13 fall through at 1e-3, 2 to 5 at 1e-2, and
-    // no step says so.
-    if (ratio > 1e-2 || h < 0.1) {
-        EXPECT_TRUE(isOn(sheet, ball) || scene.shells->lastStep().passedSteps > 0);
-    }
+    EXPECT_TRUE(isOnOrBeside(sheet, ball) || scene.shells->lastStep().passedSteps > 0);
 }
 INSTANTIATE_TEST_SUITE_P(Grid, MassRatio,
                          ::testing::Combine(::testing::Values(1e-3, 1.0, 1e2, 1e5, 1e6),

@@ -35,6 +35,15 @@ struct Pair {
         list.push_back(obstacles.make(body, kStep, nullptr, false));
         return list;
     }
+    /// Whether the body crosses the sheet on its way by `move` while the sheet stands, or goes along.
+    bool crosses(const Vec3& move, const Vec3& moveOfSheet = Vec3::Zero()) {
+        const Points start = sheet.shell().positions(), end = start.colwise() + moveOfSheet;
+        const Points *starts[] = {&start}, *ends[] = {&end};
+        Vec6 twist = Vec6::Zero();
+        twist.head<3>() = move / kStep;
+        const char all[] = {1};
+        return contacts.crosses({starts, ends, {&twist, 1}, all, kStep});
+    }
 };
 
 TEST(ShellContacts, FindEachVertexAsFarAsItMayCome) {
@@ -57,6 +66,35 @@ TEST(ShellContacts, FindEachVertexAsFarAsItMayCome) {
     EXPECT_EQ(own.size(), expected);
     EXPECT_LT(own.size(), all.size());
     for (const Contact& contact : own) EXPECT_LE(contact.gap, reach[contact.vertices[0]]);
+}
+
+/// Wherever the way leads, in triangles and where they meet, and as well when it is the sheet that moves.
+TEST(ShellContacts, SeeABodyThatGoesThrough) {
+    for (const auto& [x, z] :
+         {std::pair{0.11, 0.07}, {0.125, 0.125}, {0.0, 0.1}, {0.25, 0.25}, {-0.31, 0.2}, {0.07, 0.0}})
+        for (const Vec3& aside : {Vec3(0, 0, 0), Vec3(0.3, 0, -0.2)}) {
+            Pair pair(4, std::make_unique<btSphereShape>(btScalar(0.005)), {x, 0.01, z});
+            EXPECT_TRUE(pair.crosses(Vec3(0, -0.02, 0), aside)) << x << " " << z;
+            EXPECT_TRUE(pair.crosses(aside, Vec3(0, 0.02, 0))) << x << " " << z;
+            EXPECT_FALSE(pair.crosses(Vec3(0, -0.009, 0), aside)) << x << " " << z;
+            EXPECT_FALSE(pair.crosses(Vec3(0, -0.02, 0), Vec3(0, -0.015, 0))) << x << " " << z;
+        }
+    Pair beside(4, std::make_unique<btSphereShape>(btScalar(0.005)), {0.503, 0.01, 0.1});
+    EXPECT_FALSE(beside.crosses(Vec3(0, -0.02, 0)));
+}
+
+/// Two balls with their common centre of mass between them: there a sheet may pass.
+TEST(ShellContacts, LetASheetPassBetweenThePartsOfABody) {
+    static btSphereShape ball(btScalar(0.005));
+    for (const bool isMassive : {false, true}) {
+        auto shape = std::make_unique<btCompoundShape>();
+        for (const double side : {-0.05, 0.0, 0.05}) {
+            if (side == 0.0 && !isMassive) continue;
+            shape->addChildShape(btTransform(btQuaternion::getIdentity(), btVector3(btScalar(side), 0, 0)), &ball);
+        }
+        Pair pair(4, std::move(shape), {0.11, 0.01, 0.07});
+        EXPECT_EQ(pair.crosses(Vec3(0, -0.02, 0)), isMassive);
+    }
 }
 
 }  // namespace

@@ -117,7 +117,7 @@ struct ContactPose {
 struct ContactSweep {
     std::span<const Points*const> start, end;  ///< positions, one per shell of the island [m]
     std::span<const Vec6> twists;              ///< one per body
-    std::span<const char> fast;                ///< one per body: whether to look at it
+    std::span<const char> bodies;              ///< one per body: whether to look at it
     double time;                               ///< the step's length [s]
 };
 
@@ -130,10 +130,13 @@ class ContactDetector {
     /// deepest.
     virtual void find(const ContactPose& pose, double vertexReach, double faceReach,
                       std::vector<Contact>& contacts) = 0;
-    /// Appends the contacts that vertices, edges and triangles make with the fast bodies on their way, for bodies that
+    /// Appends the contacts that vertices, edges and triangles make with these bodies on their way, for bodies that
     /// could have passed a shell between two poses. `gap` is how far that motion brings them together along the normal
     /// until they touch, `normal` and `point` are those of that moment; `time` is when it is.
     virtual void sweep(const ContactSweep&, std::vector<Contact>&) {}
+    /// Whether a shell goes through the centre of mass of one of these bodies on that way; of those that have it
+    /// inside.
+    virtual bool crosses(const ContactSweep&) { return false; }
     /// Bodies have moved by `twists`, one per body, for a time [s]: poses are counted from there on.
     virtual void advance(std::span<const Vec6>, double) {}
 };

@@ -33,7 +33,7 @@ struct StepReport {
     bool settled = true;    ///< false: contacts have used up their rounds, and may not agree with the motion
     bool finite = true;     ///< false: the step was rejected and the state is what it was before
     bool limited = false;   ///< Newton did not settle and the step would have gained energy: deformation was cut short
-    bool passed = false;    ///< a fast body is through a shell at the end of the step
+    bool passed = false;    ///< a body went through a shell in the step
     bool mayPass = false;   ///< contacts of a fast body did not settle: it may be on its way through
     double deepestGap = 0.0;  ///< most negative predicted gap that was left at the end of the step [m], <= 0
     StepTimes times;          ///< all zero without a clock

@@ -42,23 +42,36 @@ void ContactResponse::findAtEnd(const IslandVelocities& solved, const Points& y)
     dropPassed();
 }
 
-/// The same for the solved motion, into m_found.
-void ContactResponse::sweepToEnd() {
+ContactSweep ContactResponse::wayToEnd(std::span<const char> bodies) {
     m_startPoses.clear();
     m_endPoses.clear();
     for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
         m_startPoses.push_back(&m_input.shells[k]->positions());
         m_endPoses.push_back(&m_end[k]);
     }
-    m_found.clear();
-    m_input.contacts->sweep({m_startPoses, m_endPoses, m_endTwists, m_fast, m_input.h}, m_found);
+    return {m_startPoses, m_endPoses, m_endTwists, bodies, m_input.h};
 }
 
-bool ContactResponse::passes(const IslandVelocities& solved, const Points& y) {
-    if (!m_input.contacts || !m_anyFast) return false;
-    moveToEnd(solved, y);
-    sweepToEnd();
-    return !m_found.empty();
+/// What fast bodies meet on the solved way, into m_found.
+void ContactResponse::sweepToEnd() {
+    m_found.clear();
+    m_input.contacts->sweep(wayToEnd(m_fast), m_found);
+}
+
+/// Not only of fast bodies: between the corners of a triangle larger than they are others go through it little by
+/// little, and where contacts have not settled anything may. (What is anchored in its middle has a triangle there.)
+bool ContactResponse::passes(const IslandVelocities& solved, const Points& y, bool isUnsure) {
+    if (!m_input.contacts) return false;
+    const double longest = *std::max_element(m_edge.begin(), m_edge.end());
+    m_mayCross.clear();
+    for (std::size_t b = 0; b < m_input.bodies.size(); ++b)
+        m_mayCross.push_back(isUnsure || m_fast[b] || m_input.bodies[b].inner < longest);
+    for (const Anchor& anchor : m_input.anchors) m_mayCross[anchor.body] = 0;
+    const bool mayAnyCross = std::find(m_mayCross.begin(), m_mayCross.end(), 1) != m_mayCross.end();
+    if (!m_anyFast && !mayAnyCross) return false;
+    if (!isQuick()) moveToEnd(solved, y);  // else pushOut is to know where what it pushes was found
+    if (m_anyFast) sweepToEnd();
+    return (m_anyFast && !m_found.empty()) || (mayAnyCross && m_input.contacts->crosses(wayToEnd(m_mayCross)));
 }
 
 bool ContactResponse::checkEnd(const IslandVelocities& solved, const Points& y, int round) {

@@ -77,8 +77,8 @@ class ContactResponse {
     void forget(int body) { m_forgotten.insert(body); }
     double slop() const { return m_vertexSlop; }
     bool hasFastBody() const { return m_anyFast; }
-    /// Whether a fast body goes through a shell with these velocities.
-    bool passes(const IslandVelocities& solved, const Points& y);
+    /// Whether a body goes through a shell with these velocities. `isUnsure`: to be asked of all bodies.
+    bool passes(const IslandVelocities& solved, const Points& y, bool isUnsure);
 
   private:
     /// Coulomb friction of a contact, as the next solve has it.
@@ -181,6 +181,7 @@ class ContactResponse {
     void findFast();
     void sweepAtStart();
     void moveToEnd(const IslandVelocities& solved, const Points& y);
+    ContactSweep wayToEnd(std::span<const char> bodies);
     void sweepToEnd();
     bool closeFirst(int round);
     bool closePassed(const Contact& contact, int round);
@@ -275,6 +276,7 @@ class ContactResponse {
     std::vector<Points> m_end;             ///< where the solved motion ends, of each shell
     std::vector<Vec6> m_endTwists;         ///< of each body
     std::vector<char> m_fast;              ///< per body: may pass a shell within the step
+    std::vector<char> m_mayCross;          ///< per body: see passes
     std::vector<char> m_comes;             ///< per body: see findComing
     bool m_anyFast = false;
     std::vector<char> m_stiff;  ///< per shell: has pins and is stiff as a whole, beside free bodies

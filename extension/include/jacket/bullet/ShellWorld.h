@@ -27,7 +27,7 @@ struct WorldReport {
     bool converged = true;
     bool settled = true;          ///< false: contacts of a shell have used up their rounds
     bool finite = true;           ///< false: a shell's step was rejected; it stood still
-    bool passed = false;          ///< a fast body went through a shell, or may have
+    bool passed = false;          ///< a body went through a shell, or may have
     int rejectedSteps = 0;        ///< since the world was made: not `finite`, or of no possible length
     int unconvergedSteps = 0;     ///< since the world was made
     int unsettledSteps = 0;       ///< since the world was made
