@@ -45,6 +45,26 @@ TEST_P(SheetOnIncline, SlidesAsCoulombSaysAboveIt) {
 INSTANTIATE_TEST_SUITE_P(Grid, SheetOnIncline,
                          ::testing::Combine(::testing::Values(2, 4, 9), ::testing::Values(1.0 / 60, 1.0 / 240)));
 
+/// Of few vertices each: what the solve leaves over, and what friction gets a step late, would show.
+TEST(CoarseSheetOnIncline, DoesAsCoulombSays) {
+    constexpr double kLarge = 1.0, kSettling = 1.0, kHeld = 2.0, kSliding = 0.75;  // [m], [s]
+    for (const double friction : {0.37, 0.5})
+        for (const int cells : {2, 5}) {
+            Incline scene(friction, kLarge, cells, materials::rubber());
+            scene.run(kSettling, kStep);
+            const double start = scene.place();
+            scene.run(kHeld, kStep);
+            EXPECT_LT(scene.place() - start, kHeld * Incline::mostCreep(kLarge))
+                << friction << ", " << cells << " cells";
+        }
+    for (const ShellMaterial& material : {materials::paper(), materials::steel(5e-4)}) {
+        Incline scene(0.2, kLarge, 2, material);
+        scene.run(kSliding, kStep / 4);
+        const double wanted = Incline::accelerationByCoulomb(0.2) * (kSliding + kStep / 4);
+        EXPECT_NEAR(scene.speed(), wanted, 0.02 * wanted);
+    }
+}
+
 /// A solid ball that rolls without slipping: a = 5/7 g sin. It lies on the sheet only, not on the plane below.
 /// Cells along the sheet's 1 m, whether all of it is pinned.
 class RollingBall : public ::testing::TestWithParam<std::tuple<int, bool>> {};

@@ -128,6 +128,7 @@ class ContactResponse {
     /// What is stiff for its mesh passes on what a contact does to all others; its rounds are cheap: see ShellFactor.
     /// So does sheet metal that walls press, and no free body is thrown if it takes long.
     static constexpr Care kAtLength{48, 1e-3};
+    static constexpr Care kOfFew{96, 1e-3};  ///< vertices
     static constexpr Care kAmongWalls{6, 0.02};
     /// Where walls are fast and more does not settle, shorter steps are the quicker way: see StepParts.
     static constexpr Care kInPassing{12, 1e-3};
