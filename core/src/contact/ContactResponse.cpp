@@ -494,15 +494,18 @@ double ContactResponse::timeOfTouch(const Touch& touch) const {
     return closing > 0.0 ? std::max(touch.contact.gap, 0.0) / closing : std::numeric_limits<double>::infinity();
 }
 
+/// What stands inside a body is moved out of it a little; where it cannot be moved by itself, as something holds a
+/// corner of it or the body is what must give way, it leaves by its velocity.
 void ContactResponse::alter(Touch& touch, Points& y) const {
     const Contact& c = touch.contact;
-    if (isBacked(c)) {
+    const bool isHeldThere = isHeld(c);
+    if (isBacked(c) || (isHeldThere && !c.isVertex())) {
         touch.target = speedOutOf(-c.gap);
         touch.allowedGap = std::min(0.0, c.gap + m_input.h * touch.target);
         return;
     }
+    if (isHeldThere) return;
     const double by = std::min(-kAlteration * c.gap, kAlteration * m_edge[c.shell]);
-    if (isHeld(c)) return;
     const double spread = c.weights.squaredNorm();
     for (int a = 0; a < (c.isVertex() ? 1 : 3); ++a) {
         auto column = y.col(globalVertex(c, a));
