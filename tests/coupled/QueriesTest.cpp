@@ -46,6 +46,28 @@ TEST(Queries, ARayHitsWhereTheSheetIs) {
     EXPECT_EQ(scene.shells->find(ball), nullptr);
 }
 
+/// Which triangle that is, as for Bullet's own meshes.
+TEST(Queries, ARayTellsTheTriangle) {
+    struct Hit : btCollisionWorld::ClosestRayResultCallback {
+        using ClosestRayResultCallback::ClosestRayResultCallback;
+        btScalar addSingleResult(btCollisionWorld::LocalRayResult& result, bool isInWorld) override {
+            if (result.m_localShapeInfo) triangle = result.m_localShapeInfo->m_triangleIndex;
+            return ClosestRayResultCallback::addSingleResult(result, isInWorld);
+        }
+        int triangle = -1;
+    };
+    FlatSheet scene;
+    const auto& triangles = scene.sheet.triangles();
+    for (int t = 0; t < triangles.cols(); ++t) {
+        Vec3 middle = Vec3::Zero();
+        for (const int corner : triangles.col(t)) middle += scene.sheet.shell().positions().col(corner) / 3.0;
+        const btVector3 at(btScalar(middle.x()), btScalar(middle.y()), btScalar(middle.z()));
+        Hit hit(at + btVector3(0, 1, 0), at - btVector3(0, 1, 0));
+        scene.world.rayTest(hit.m_rayFromWorld, hit.m_rayToWorld, hit);
+        EXPECT_EQ(hit.triangle, t);
+    }
+}
+
 /// Bullet sees the shell where setPositions put it, as it does bodies: after the bounds are updated.
 TEST(Queries, SeeAMovedShell) {
     FlatSheet scene;
