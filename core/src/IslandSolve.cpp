@@ -15,8 +15,7 @@ constexpr double kEnergyGainAlone = 0.25;  ///< as kEnergyGain where nothing can
 constexpr double kMostGainOfFast = 0.1;    ///< as kMostEnergyGain where a body goes farther than it is thick
 
 constexpr double kRough = 0.03;      ///< tolerance of a rough solve
-constexpr int kFewToSolve = 64;      ///< vertices, of which iterations cost next to nothing
-constexpr double kMostOfFew = 1e-3;  ///< tolerance there: what a guess leaves over would be the same in every step
+constexpr double kMostOfFew = 1e-3;  ///< tolerance of few vertices: what a guess leaves over would always be the same
 constexpr int kLeastCompact = 200;   ///< vertices of a shell from which on a coarse space pays in double precision
 
 /// Of a shell that is strained by as much everywhere [J].
@@ -198,7 +197,7 @@ void IslandSolver::Impl::assemble(const IslandInput& input, bool atEnd) {
 /// Of the shells'.
 double IslandSolver::Impl::leastTolerance(const IslandInput& input) const {
     double tolerance = input.shells[0]->settings().tolerance;
-    if (start.cols() <= kFewToSolve) tolerance = std::min(tolerance, kMostOfFew);
+    if (start.cols() <= ContactResponse::kFew) tolerance = std::min(tolerance, kMostOfFew);
     for (const Shell* shell : input.shells) tolerance = std::min(tolerance, shell->settings().tolerance);
     return tolerance;
 }

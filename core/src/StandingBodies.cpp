@@ -77,10 +77,8 @@ bool StandingBodies::isOnShell(const IslandInput& given, int body) {
 /// What lies on a body that does not stand does not either. `row`: how fast the two part, from the body's twist. True
 /// if that is so.
 bool StandingBodies::dropUnborne(int body, int below, const Vec6& row) {
-    constexpr double kBeside = 0.1;  // cosine of the angle between the contact's normal and gravity
-    const Vec3& gravity = m_given->gravity;
     if (m_given->bodies[body].prescribed || !m_bodies[body].prescribed || m_bodies[below].prescribed) return false;
-    if (row.head<3>().dot(gravity) > kBeside * gravity.norm()) return false;  // it bears the other
+    if (RigidContact::bears(row, m_given->gravity)) return false;
     m_bodies[body].prescribed = false;
     return true;
 }

@@ -50,11 +50,9 @@ bool isQuiet(const btCollisionObject& object) {
 
 /// Whether a rigid contact of an island bears one of its bodies on another one.
 bool liesOnAnother(const Island& island, int body, const Vec3& gravity) {
-    constexpr double kBeside = 0.1;  // cosine of the angle between the contact's normal and gravity
-    const double least = kBeside * gravity.norm();
     return std::any_of(island.rigidContacts.begin(), island.rigidContacts.end(), [&](const RigidContact& pair) {
-        return (pair.a == body && -pair.rowA.head<3>().dot(gravity) > least) ||
-               (pair.b == body && -pair.rowB.head<3>().dot(gravity) > least);
+        return (pair.a == body && RigidContact::bears(pair.rowB, gravity)) ||
+               (pair.b == body && RigidContact::bears(pair.rowA, gravity));
     });
 }
 

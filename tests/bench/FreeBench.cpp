@@ -23,9 +23,9 @@ void tell(const FreeScene& scene, const std::string& material, int cells, int st
         solves += run.solves;
         iterations += run.iterations;
         steps += run.steps;
-        const std::string fault = run.outcome.fault(scene.fastest) ? run.outcome.fault(scene.fastest) : "";
-        faulty += fault.empty() ? 0 : 1;
-        deep += fault == "deep" ? 1 : 0;
+        const char* const fault = run.outcome.fault(scene.fastest);
+        faulty += fault ? 1 : 0;
+        deep += fault && fault == std::string("deep") ? 1 : 0;
         unsettled += run.outcome.unsettled;
     }
     std::printf(

@@ -197,8 +197,7 @@ TEST(SmallBodies, ThatGoThroughASheetAreReported) {
         auto& sheet = scene.shells->add(squareSheet(kSide, kCells), trampolineCloth());
         for (int i = 0; i < sheet.vertexCount(); ++i) sheet.pin(i);
         auto& ball = scene.addSphere(0.005, 0.0, btVector3(btScalar(x), btScalar(0.05), btScalar(z)));
-        ball.setCollisionFlags(ball.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
-        ball.setActivationState(DISABLE_DEACTIVATION);
+        makeKinematic(ball);
         for (double y = 0.05; y > -0.05; y -= kSpeed * kStep) {
             btTransform pose = ball.getWorldTransform();
             pose.setOrigin(btVector3(btScalar(x), btScalar(y), btScalar(z)));

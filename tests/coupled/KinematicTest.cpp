@@ -200,15 +200,16 @@ TEST_P(KinematicCourse, ATurningBodyDoesNotComeThrough) {
 TEST_P(KinematicCourse, AShakenBodyKeepsTheClothOff) {
     EXPECT_LT(medianDepth(courses::kShake, -0.02), 3e-4);
 }
+INSTANTIATE_TEST_SUITE_P(Shapes, KinematicCourse,
+                         ::testing::Combine(::testing::Values("box", "mesh", "capsule", "disc"),
+                                            ::testing::Values(5, 12)));
+
 /// Into a few large triangles with a corner that is pinned: each step adds less to the depth than is looked at, and
 /// nothing took it back.
 TEST(KinematicRod, ThatIsPressedDownDoesNotSinkInLittleByLittle) {
     for (const ShellMaterial& material : {materials::cotton(), materials::paper(), materials::rubber()})
         EXPECT_LT((KinematicScene{material, courses::kPress, kPushers[5], 5, kStep / 4}.run().deepest), 3e-4);
 }
-INSTANTIATE_TEST_SUITE_P(Shapes, KinematicCourse,
-                         ::testing::Combine(::testing::Values("box", "mesh", "capsule", "disc"),
-                                            ::testing::Values(5, 12)));
 
 /// Two kinematic boxes close on the edge of a sheet that lies on a table, then lift it. `squeeze`: how much nearer than
 /// the sheet is thick each of them comes.

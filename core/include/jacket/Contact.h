@@ -64,6 +64,12 @@ struct RigidContact {
     Vec6 rowA = Vec6::Zero();  ///< how fast it opens, from the twist of a
     Vec6 rowB = Vec6::Zero();  ///< and from that of b
     double weight = 0.0;       ///< of the stiff term [kg], > 0
+
+    /// Whether the body of that row bears the other one there, rather than lies on it or is beside it.
+    static bool bears(const Vec6& row, const Vec3& gravity) {
+        constexpr double kBeside = 0.1;  // cosine of the angle between the contact's normal and gravity
+        return row.head<3>().dot(gravity) > kBeside * gravity.norm();
+    }
 };
 
 /// Where a piece of a shell meets a body: one vertex (weights 1 0 0), or a point of an edge or triangle.

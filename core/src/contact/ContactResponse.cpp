@@ -15,8 +15,7 @@ constexpr double kNone = -std::numeric_limits<double>::infinity();
 constexpr double kRowPenalty = 10.0;  // penalty of a soft row over the stiffness of its vertices: a round leaves < 1/10
 constexpr double kOffsetDecay = 0.998;     // a step: a lift that is no longer needed goes away
 constexpr int kFrictionRoundsGoingOn = 2;  // the same where few are made and contacts are not new
-constexpr int kFew = 64;  // vertices, of which rounds cost next to nothing: what rests on friction stays where it is
-constexpr double kSameContact = 0.3;  // of an edge: how far the point of a face's contact may move in a step
+constexpr double kSameContact = 0.3;       // of an edge: how far the point of a face's contact may move in a step
 
 using Normals = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3>;
 using Shares = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
@@ -165,9 +164,10 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     for (const Shell* shell : input.shells) m_startPoses.push_back(&shell->positions());
     m_still.assign(input.bodies.size(), Vec6::Zero());
     findAtStart(findReach());
-    const Care inFull = hasFreeBodies() ? kInFull : y.cols() > kFew ? kAtLength : kOfFew;
+    const bool areFew = y.cols() <= kFew;
+    const Care alone = areFew ? kOfFew : kAtLength, inFull = hasFreeBodies() ? kInFull : alone;
     m_bearsNoBody = hasFreeBodies() && areBorneByOthers();
-    const bool mayBeQuick = y.cols() > kFew && !isAnyStiff() && numbering.givesWay;
+    const bool mayBeQuick = !areFew && !isAnyStiff() && numbering.givesWay;
     m_care = mayBeQuick && (isAmongWalls() || m_bearsNoBody) ? kAmongWalls : inFull;
     if (numbering.isAnyFactored || m_onlyStops) m_care = kAtLength;
     dropPassed();

@@ -29,6 +29,8 @@ double strainOfPush(const Shell& shell, double by);
 /// and a body on a pinned vertex become soft rows, made exact by an augmented Lagrangian over the rounds.
 class ContactResponse {
   public:
+    /// Vertices, of which rounds and iterations cost next to nothing: what rests on friction stays where it is.
+    static constexpr int kFew = 64;
     /// How an island is numbered.
     struct Numbering {
         const std::vector<int>& offsets;       ///< of each shell's vertices
@@ -128,7 +130,7 @@ class ContactResponse {
     /// What is stiff for its mesh passes on what a contact does to all others; its rounds are cheap: see ShellFactor.
     /// So does sheet metal that walls press, and no free body is thrown if it takes long.
     static constexpr Care kAtLength{48, 1e-3};
-    static constexpr Care kOfFew{96, 1e-3};  ///< vertices
+    static constexpr Care kOfFew{96, 1e-3};  ///< see kFew
     static constexpr Care kAmongWalls{6, 0.02};
     /// Where walls are fast and more does not settle, shorter steps are the quicker way: see StepParts.
     static constexpr Care kInPassing{12, 1e-3};
