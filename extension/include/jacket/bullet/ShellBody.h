@@ -1,5 +1,5 @@
 #pragma once
-#include <LinearMath/btVector3.h>
+#include <LinearMath/btTransform.h>
 
 #include <memory>
 #include <optional>
