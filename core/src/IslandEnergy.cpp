@@ -101,14 +101,9 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
         gain += elasticEnergyGain(input, k);
         atStart += elasticAtStart[k];
     }
-    system.momentum(freeTwist, freeMomentum);
-    const BodyVectors& twists = endTwists();
-    system.momentum(twists, momentum);
-    for (std::size_t b = 0; b < dynamicBodies.size(); ++b) {
-        const double kinetic = 0.5 * freeTwist.col(b).dot(freeMomentum.col(b));
-        atStart += kinetic;
-        gain += 0.5 * twists.col(b).dot(momentum.col(b)) - kinetic;
-    }
+    const double ofBodies = supports.kineticEnergy(freeTwist);
+    atStart += ofBodies;
+    gain += supports.kineticEnergy(endTwists()) - ofBodies;
     double fastest2 = 0.0;
     for (const auto& held : system.constraints()) {  // work of pins and bodies that are moved
         if (held.body >= 0) continue;

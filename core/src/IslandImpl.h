@@ -52,9 +52,9 @@ struct IslandSolver::Impl {
     Points &rigid = newtonFrom, &reached = calmest;
     std::vector<CoupledSystem::ShellPart> parts;
     BodyVectors freeTwist, guessTwist;
-    BodyVectors twistChange;  ///< of the bodies' twists, by the shells
-    mutable BodyVectors twistsAtEnd, freeMomentum,
-        momentum;                                ///< of the bodies: twists at the end of the step, and momenta
+    BodyVectors twistChange;                     ///< of the bodies' twists, by the shells
+    mutable BodyVectors twistsAtEnd;             ///< of the bodies
+    BodyVectors momentum;                        ///< of the bodies
     bool unsettled = false;                      ///< contacts of this step have used up their rounds
     double reference = -1.0;                     ///< r^T P^-1 r that the tolerance refers to; < 0: not known
     int lastRounds = 1;                          ///< changes of the contacts in the last step, and one

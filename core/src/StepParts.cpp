@@ -37,7 +37,7 @@ bool StepParts::areAllowed(const IslandInput& whole) {
     if (!whole.contacts || whole.inOnePiece) return false;
     if (std::all_of(whole.bodies.begin(), whole.bodies.end(), isPrescribed)) return true;
     const double most = kSteady * whole.h * whole.gravity.norm();
-    const auto stays = [most](double opening) { return std::abs(opening) <= most; };
+    const auto stays = [most](double opening) { return opening <= most; };
     const auto isBorneEvenly = [&](const CoupledBody& body) {
         return body.prescribed ||
                std::all_of(body.supports.begin(), body.supports.end(), [&](const BodySupport& support) {
@@ -47,8 +47,8 @@ bool StepParts::areAllowed(const IslandInput& whole) {
     };
     const auto keepsClosed = [&](const RigidContact& pair) {
         const CoupledBody &a = whole.bodies[pair.a], &b = whole.bodies[pair.b];
-        return stays(pair.rowA.dot(a.startTwist) + pair.rowB.dot(b.startTwist)) &&
-               stays(pair.rowA.dot(a.freeTwist) + pair.rowB.dot(b.freeTwist));
+        return stays(pair.rowA.dot(a.startTwist) + pair.rowB.dot(b.startTwist) - pair.velocity) &&
+               stays(pair.rowA.dot(a.freeTwist) + pair.rowB.dot(b.freeTwist) - pair.velocity);
     };
     return whole.couplings.empty() && std::all_of(whole.bodies.begin(), whole.bodies.end(), isBorneEvenly) &&
            std::all_of(whole.rigidContacts.begin(), whole.rigidContacts.end(), keepsClosed);

@@ -1,5 +1,6 @@
 #include "Islands.h"
 
+#include <BulletDynamics/Dynamics/btDynamicsWorld.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 
 namespace jacket::bullet {
 
-IslandFinder::IslandFinder(btCollisionWorld& world, Obstacles& obstacles, std::span<ShellBody* const> shells,
+IslandFinder::IslandFinder(btDynamicsWorld& world, Obstacles& obstacles, std::span<ShellBody* const> shells,
                            std::pmr::memory_resource& memory)
     : m_world(world), m_obstacles(obstacles), m_shells(shells), m_memory(memory), m_neighbours(&memory) {
     collectPairs();
@@ -83,7 +84,7 @@ std::pmr::vector<int> IslandFinder::leaders(std::span<const Obstacle> obstacles,
 }
 
 std::pmr::vector<Island> IslandFinder::find(double h, bool hasMoved) {
-    RigidContacts contacts(*m_world.getDispatcher(), m_memory);
+    RigidContacts contacts(m_world, hasMoved ? 0.0 : h, m_memory);
     std::pmr::vector<btCollisionObject*> objects(&m_memory);
     for (const Neighbour& n : m_neighbours) objects.push_back(n.object);
     for (btCollisionObject* object : contacts.join(objects)) m_neighbours.push_back(makeNeighbour(*object));
@@ -131,7 +132,8 @@ std::pmr::vector<Island> IslandFinder::find(double h, bool hasMoved) {
             if (bodyIn[i][c.a] >= 0) islands[i].couplings.push_back({bodyIn[i][c.a], bodyIn[i][c.b], c.mass});
         for (const auto& c : rigidContacts)
             if (bodyIn[i][c.a] >= 0)
-                islands[i].rigidContacts.push_back({bodyIn[i][c.a], bodyIn[i][c.b], c.rowA, c.rowB, c.weight});
+                islands[i].rigidContacts.push_back(
+                    {bodyIn[i][c.a], bodyIn[i][c.b], c.rowA, c.rowB, c.weight, c.velocity});
     }
     return islands;
 }

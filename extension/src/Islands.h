@@ -7,6 +7,8 @@
 #include "Obstacles.h"
 #include "jacket/bullet/ShellBody.h"
 
+class btDynamicsWorld;
+
 namespace jacket::bullet {
 
 /// Shells that share dynamic bodies or multibodies, with the obstacles near them: one solve.
@@ -25,7 +27,7 @@ struct Island {
 class IslandFinder {
   public:
     /// `memory`: for all of it, the islands too.
-    IslandFinder(btCollisionWorld& world, Obstacles& obstacles, std::span<ShellBody* const> shells,
+    IslandFinder(btDynamicsWorld& world, Obstacles& obstacles, std::span<ShellBody* const> shells,
                  std::pmr::memory_resource& memory);
     /// `hasMoved`: bodies have made their motion already, see Obstacles::make.
     std::pmr::vector<Island> find(double h, bool hasMoved);
@@ -49,7 +51,7 @@ class IslandFinder {
     void addObstacle(Island& island, const Obstacle& obstacle, Neighbour& neighbour,
                      std::span<const int> indexInIsland) const;
 
-    btCollisionWorld& m_world;
+    btDynamicsWorld& m_world;
     Obstacles& m_obstacles;
     std::span<ShellBody* const> m_shells;
     std::pmr::memory_resource& m_memory;

@@ -117,7 +117,7 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContact
         if (moves && !hasMoved && m_gravityIsNoForce)
             coupled.freeTwist.head<3>() += h * fromBullet(rigid->getGravity());
         if (moves) coupled.mass = massOf(*rigid);
-        if (moves && contacts) contacts->addSupports(*rigid, hasMoved ? 0.0 : h, coupled, freeSupports());
+        if (moves && contacts) contacts->addSupports(*rigid, coupled, freeSupports());
     }
     coupled.position = obstacle.start.translation();
     // Of ground the place nearest to a vertex is where it comes down if it moves by less than a triangle.

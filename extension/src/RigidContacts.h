@@ -7,9 +7,10 @@
 #include <unordered_set>
 #include <vector>
 
+#include "RigidImpacts.h"
 #include "jacket/Contact.h"
 
-class btDispatcher;
+class btManifoldPoint;
 class btPersistentManifold;
 
 namespace jacket::bullet {
@@ -22,28 +23,44 @@ Vec6 twistOf(const btRigidBody& body);
 Vec6 freeTwistOf(const btRigidBody& body, double h);
 
 /// The contacts that Bullet found among bodies and that bore load in its last solve. They hold in the shells' solve
-/// too, or a shell would press a supported box through the floor, and feel only the lowest one of a pile.
+/// too, or a shell would press a supported box through the floor, and feel only the lowest one of a pile. So do the
+/// impacts of the coming step, or a body would be stopped, or thrown, into the shells that touch it.
 class RigidContacts {
   public:
-    RigidContacts(btDispatcher& dispatcher, std::pmr::memory_resource& memory)
-        : m_dispatcher(dispatcher), m_memory(memory), m_manifolds(&memory), m_joined(&memory) {}
+    /// `h`: of the coming step [s]; 0: bodies have made their motion already, and nothing is foreseen.
+    RigidContacts(btDynamicsWorld& world, double h, std::pmr::memory_resource& memory)
+        : m_world(world),
+          m_h(h),
+          m_memory(memory),
+          m_manifolds(&memory),
+          m_near(&memory),
+          m_impacts(&memory),
+          m_joined(&memory) {}
     /// To be called first. The free bodies of the piles that these belong to, up to a number that a solve can carry.
     /// Contacts between any of all these are `between`'s, and not `addSupports`' any more.
     std::pmr::vector<btCollisionObject*> join(std::span<btCollisionObject* const> bodies);
-    /// What holds a body in the coming step of length h besides the joined bodies: stiff terms of its mass. A free body
-    /// among that is as heavy as it is. `supports`: what coupled.supports will show.
-    void addSupports(const btRigidBody& body, double h, CoupledBody& coupled, std::vector<BodySupport>& supports) const;
+    /// What holds a body in the coming step besides the joined bodies: stiff terms of its mass. A body among that which
+    /// is not held itself is as heavy as it is. `supports`: what coupled.supports will show.
+    void addSupports(const btRigidBody& body, CoupledBody& coupled, std::vector<BodySupport>& supports) const;
     /// Contacts among the joined bodies; indices of obstacles.
     std::pmr::vector<RigidContact> between(std::span<const Obstacle> obstacles) const;
 
   private:
     void index();
+    void indexNear();
+    void foresee(const btCollisionObject& body);
     using Manifolds = std::pmr::vector<btPersistentManifold*>;
     std::span<btPersistentManifold* const> manifoldsOf(const btCollisionObject& object) const;
 
-    btDispatcher& m_dispatcher;
+    double openingOf(const btPersistentManifold& manifold, const btManifoldPoint& point) const;
+
+    btDynamicsWorld& m_world;
+    double m_h;
     std::pmr::memory_resource& m_memory;
     std::pmr::unordered_map<const btCollisionObject*, Manifolds> m_manifolds;
+    /// By Bullet's broadphase, of every free object: what may meet it.
+    std::pmr::unordered_map<const btCollisionObject*, std::pmr::vector<btCollisionObject*>> m_near;
+    std::pmr::vector<RigidImpact> m_impacts;
     std::pmr::unordered_set<const btCollisionObject*> m_joined;
 };
 

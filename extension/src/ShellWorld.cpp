@@ -244,7 +244,7 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     std::erase_if(all, [](const ShellBody* shell) { return shell->isAsleep(); });
     m_report.awake = static_cast<int>(all.size());
     if (!all.empty())
-        for (Island& island : IslandFinder(*world, m_impl->obstacles, all, m_impl->memory).find(double(h), false)) {
+        for (Island& island : IslandFinder(m_world, m_impl->obstacles, all, m_impl->memory).find(double(h), false)) {
             m_impl->checks.look(island);
             if (areLedByUser(
                     island.obstacles, [](const Obstacle& o) -> auto& { return *o.object; }))
@@ -314,7 +314,7 @@ void ShellWorld::solveNewcomers(btCollisionWorld& world, double h) {
         world.updateSingleAabb(shell->m_proxy.get());
     }
     world.computeOverlappingPairs();
-    for (Island& island : IslandFinder(world, m_impl->obstacles, newcomers, m_impl->memory).find(h, true)) {
+    for (Island& island : IslandFinder(m_world, m_impl->obstacles, newcomers, m_impl->memory).find(h, true)) {
         solveIsland(island, h);
         for (const Obstacle& obstacle : island.obstacles)
             if (const auto known = m_impl->solved.find(obstacle.object); known != m_impl->solved.end())

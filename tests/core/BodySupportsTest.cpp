@@ -38,6 +38,39 @@ TEST(BodySupports, APileStopsAsOneOnWhatBearsItsLowestBody) {
     EXPECT_EQ(supports.couplings()[0].mass(1, 1), -1e5);
 }
 
+/// As Bullet's solve has it: they part as fast as they are to, with what momentum they had.
+TEST(BodySupports, APairPartsAtLeastAsFastAsItIsTo) {
+    std::vector<CoupledBody> bodies{falling(1), falling(1)};
+    bodies[0].freeTwist[1] = 0.0;
+    RigidContact pair = onTop(1e6);
+    pair.velocity = 0.3;
+    BodySupports supports;
+    supports.begin(bodies, {}, std::vector{pair}, {0, 1});
+    EXPECT_NEAR(supports.freeTwists()[0][1], -0.65, 1e-5);
+    EXPECT_NEAR(supports.freeTwists()[1][1], -0.35, 1e-5);
+    Eigen::Matrix<double, 6, Eigen::Dynamic> slower(6, 2), faster(6, 2);
+    slower << Vec6::Zero(), 0.2 * up();
+    faster << Vec6::Zero(), 0.4 * up();
+    EXPECT_FALSE(supports.update(slower, 0.1));
+    EXPECT_TRUE(supports.update(faster, 0.1));
+    EXPECT_NEAR(supports.freeTwists()[0][1], 0.0, 1e-9);
+    EXPECT_NEAR(supports.freeTwists()[1][1], -1.0, 1e-9);
+}
+
+TEST(BodySupports, StiffTermsHaveNoEnergy) {
+    std::vector<CoupledBody> bodies{falling(1), falling(10)};
+    const BodySupport ground[] = {{up(), 0.5, 1e4}};
+    bodies[0].supports = ground;
+    bodies[0].mass += 1e4 * up() * up().transpose();
+    RigidContact pair = onTop(1e5);
+    pair.velocity = 0.3;
+    BodySupports supports;
+    supports.begin(bodies, {}, std::vector{pair}, {0, 1});
+    Eigen::Matrix<double, 6, Eigen::Dynamic> twists(6, 2);
+    twists << 2.0 * up(), 3.0 * up();
+    EXPECT_NEAR(supports.kineticEnergy(twists), 0.5 * 1 * 4 + 0.5 * 10 * 9, 1e-6);
+}
+
 TEST(BodySupports, APairLetsGoWhereItPullsAndComesBackOnce) {
     const std::vector<CoupledBody> bodies{falling(1), falling(1)};
     BodySupports supports;

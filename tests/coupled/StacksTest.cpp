@@ -218,6 +218,28 @@ TEST_P(ClothOverABall, LiesOverIt) {
 }
 INSTANTIATE_TEST_SUITE_P(Mass, ClothOverABall, ::testing::Values(0.3, 3.0));
 
+/// Bullet stops the box in one step, from 3 m/s: the cloth has to know of it, or it goes on into the box.
+TEST(ClothOnAFallingBox, StaysOnItWhenItLands) {
+    const FreeScene scene = free_scenes::clothOnFallingBox("cloth on a box", 1.0);
+    for (const int cells : {12, 24}) {
+        for (int start = 0; start < 3; ++start) {
+            const FreeScene::Run run = scene.run(materials::cotton(), cells, start);
+            EXPECT_LT(run.outcome.deepest, 2e-3) << cells << " cells, start " << start;
+            EXPECT_LE(run.outcome.unsettled, 5) << cells << " cells, start " << start;
+        }
+    }
+}
+
+/// Three boxes fall onto three that lie in a sheet. They would be thrown out of it, or through it.
+TEST(BoxesInAHammock, TakeOthersThatFallOntoThem) {
+    const FreeScene scene = free_scenes::boxesInHammock("boxes in a hammock", 0.3);
+    for (int start = 0; start < 3; ++start) {
+        const FreeScene::Run run = scene.run(materials::cotton(), 24, start);
+        EXPECT_LT(run.outcome.deepest, 0.018) << "start " << start;
+        EXPECT_GT(run.lowest, 0.9) << "start " << start;
+    }
+}
+
 /// Three flat boxes fall a little into a sheet that is held along two edges, and stay a stack.
 TEST(Stack, StandsInAHammock) {
     Scene scene;

@@ -20,6 +20,7 @@ struct FreeScene {
         SheetOutcome outcome;
         int steps = 0, solves = 0, iterations = 0;
         double seconds = 0.0, longest = 0.0;  ///< of all steps, of one [s]
+        double lowest = 1e300;                ///< where a body's centre is at the end [m]
     };
 
     const char* name;
@@ -48,6 +49,8 @@ struct FreeScene {
             run.outcome.note(scene, sheet, depth);
             ++run.steps;
         }
+        for (const btRigidBody* body : bodies)
+            run.lowest = std::min(run.lowest, double(body->getWorldTransform().getOrigin().y()));
         return run;
     }
 };
@@ -136,6 +139,17 @@ inline FreeScene fallingTogether(const char* name, double mass) {
                 constexpr btScalar half = btScalar(0.1);
                 bodies.push_back(&scene.addBox(btVector3(half, half, half), mass, moved(0, 1.2, 0, aside)));
                 return addSheet(scene, material, cells, {0, 0.8, 0});
+            }};
+}
+
+/// A box that falls to the floor with a cloth on it.
+inline FreeScene clothOnFallingBox(const char* name, double mass) {
+    return {name, 1.5, 8.0,
+            [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
+                constexpr double half = 0.2, drop = 0.5;
+                bodies.push_back(&scene.addBox(btVector3(btScalar(half), btScalar(half), btScalar(half)), mass,
+                                               btVector3(0, btScalar(drop + half), 0)));
+                return addSheet(scene, material, cells, Vec3(0.0, drop + 2.0 * half + 1e-4, 0.01) + aside);
             }};
 }
 

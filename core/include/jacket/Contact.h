@@ -8,12 +8,12 @@
 /// Everything that the solver and the collision code say to each other.
 namespace jacket {
 
-/// A rigid contact of a body with something else, which bore load when the step began: it keeps row . twist from
-/// falling below `velocity`. Mass and free twist of its body are given as if it held either way, by a stiff term weight
-/// row row^T.
+/// A rigid contact of a body with something else, which bore load when the step began, or is closed in it: it keeps
+/// row . twist from falling below `velocity`. Mass and free twist of its body are given as if it held either way, by a
+/// stiff term weight row row^T.
 struct BodySupport {
     Vec6 row = Vec6::Zero();  ///< velocity along the contact's normal, towards the body, from the body's twist
-    double velocity = 0.0;    ///< of what is on the other side [m/s]
+    double velocity = 0.0;    ///< of what is on the other side, and by which the two are to part at least [m/s]
     double weight = 0.0;      ///< how heavy that is [kg], > 0
 };
 
@@ -56,14 +56,15 @@ struct BodyCoupling {
     Mat6 mass = Mat6::Zero();  ///< M_ab: body a has momentum M_ab w_b, body b has M_ab^T w_a
 };
 
-/// A rigid contact between two dynamic bodies of the island, which bore load when the step began: it keeps
-/// rowA . w_a + rowB . w_b from falling below zero, by a stiff term. Masses and free twists are given without it. A
-/// body of prescribed motion must stand still.
+/// A rigid contact between two dynamic bodies of the island, which bore load when the step began, or is closed in it:
+/// it keeps rowA . w_a + rowB . w_b from falling below `velocity`, by a stiff term. Masses and free twists are given
+/// without it. A body of prescribed motion must stand still.
 struct RigidContact {
     int a = 0, b = 0;          ///< bodies, a != b
     Vec6 rowA = Vec6::Zero();  ///< how fast it opens, from the twist of a
     Vec6 rowB = Vec6::Zero();  ///< and from that of b
     double weight = 0.0;       ///< of the stiff term [kg], > 0
+    double velocity = 0.0;     ///< with which the two are to part at least [m/s]
 
     /// Whether the body of that row bears the other one there, rather than lies on it or is beside it.
     static bool bears(const Vec6& row, const Vec3& gravity) {

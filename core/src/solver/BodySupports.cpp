@@ -11,6 +11,11 @@ constexpr double kPull = 1e-2;   // of a body's weight, or of what is pressed on
                                  // that pulls less may stay for the step
 constexpr int kMostReturns = 1;  // a contact that has let go twice stays away: it closes in the bodies' own step
 
+/// How fast a pair opens, beyond what it is to.
+double openingOf(const RigidContact& pair, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) {
+    return pair.rowA.dot(w.col(pair.a)) + pair.rowB.dot(w.col(pair.b)) - pair.velocity;
+}
+
 }  // namespace
 
 void BodySupports::begin(std::span<const CoupledBody> bodies, std::span<const BodyCoupling> couplings,
@@ -57,14 +62,17 @@ void BodySupports::addSupport(const RigidContact& pair) {
     const int body = std::max(pair.a, pair.b);
     if (body < 0) return;
     const Vec6& row = pair.a < 0 ? pair.rowB : pair.rowA;
-    m_supports.push_back({.body = body, .contact = {row, 0.0, pair.weight}});
+    m_supports.push_back({.body = body, .contact = {row, pair.velocity, pair.weight}});
     m_mass[body] += pair.weight * row * row.transpose();
+    m_momentum[body] += pair.weight * pair.velocity * row;
     m_freeTwist[body] = m_mass[body].ldlt().solve(m_momentum[body]);
 }
 
 /// The term of the pair that m_couplings has at the same place, or takes it away.
 void BodySupports::add(const Pair& pair, double sign) {
-    const auto& [a, b, rowA, rowB, weight] = pair.contact;
+    const auto& [a, b, rowA, rowB, weight, velocity] = pair.contact;
+    m_momentum[a] += sign * weight * velocity * rowA;
+    m_momentum[b] += sign * weight * velocity * rowB;
     m_mass[a] += sign * weight * rowA * rowA.transpose();
     m_mass[b] += sign * weight * rowB * rowB.transpose();
     m_couplings[m_givenCouplings + static_cast<std::size_t>(&pair - m_pairs.data())].mass +=
@@ -113,6 +121,17 @@ double BodySupports::lightest(int body) const {
     return m_ownMass[body].diagonal().head<3>().minCoeff();
 }
 
+double BodySupports::kineticEnergy(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) const {
+    double sum = 0.0;
+    for (std::size_t b = 0; b < m_ownMass.size(); ++b) {
+        const auto twist = w.col(static_cast<Eigen::Index>(b));
+        sum += 0.5 * twist.dot(m_ownMass[b] * twist);
+    }
+    for (std::size_t c = 0; c < m_givenCouplings; ++c)
+        sum += w.col(m_couplings[c].a).dot(m_couplings[c].mass * w.col(m_couplings[c].b));
+    return sum;
+}
+
 bool BodySupports::Hold::turn(double opening, double most) {
     const bool turns = holds ? opening > most : opening < 0.0;
     if (!turns || (!holds && returns == kMostReturns)) return false;
@@ -131,7 +150,7 @@ void BodySupports::findLoads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) 
             most[body] = std::max(most[body], contact.weight * (contact.velocity - contact.row.dot(w.col(body))));
     for (const auto& [contact, hold] : m_pairs) {
         if (!hold.holds) continue;
-        const double load = -contact.weight * (contact.rowA.dot(w.col(contact.a)) + contact.rowB.dot(w.col(contact.b)));
+        const double load = -contact.weight * openingOf(contact, w);
         most[contact.a] = std::max(most[contact.a], load);
         most[contact.b] = std::max(most[contact.b], load);
     }
@@ -153,10 +172,9 @@ bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, dou
         changed = true;
     }
     for (Pair& pair : m_pairs) {
-        const auto& [a, b, rowA, rowB, weight] = pair.contact;
-        const double opening = rowA.dot(w.col(a)) + rowB.dot(w.col(b));
+        const int a = pair.contact.a, b = pair.contact.b;
         const double pull = kPull * std::max(std::min(lightest(a), lightest(b)) * kick, std::min(load[a], load[b]));
-        if (!pair.hold.turn(opening, pull / weight)) continue;
+        if (!pair.hold.turn(openingOf(pair.contact, w), pull / pair.contact.weight)) continue;
         add(pair, pair.hold.holds ? 1.0 : -1.0);
         changed = true;
     }

@@ -29,7 +29,9 @@ class BodySupports {
                                                             double kick);
     const std::vector<Mat6>& masses() const { return m_mass; }
     const Mat6& ownMass(int body) const { return m_ownMass[body]; }  ///< without what bears it
-    double lightest(int body) const;                                 ///< its own, along the axis where it is least [kg]
+    /// Of the bodies alone, with joints and without rigid contacts [J].
+    double kineticEnergy(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) const;
+    double lightest(int body) const;  ///< its own, along the axis where it is least [kg]
     const std::vector<Vec6>& freeTwists() const { return m_freeTwist; }
     const std::vector<BodyCoupling>& couplings() const { return m_couplings; }
 
