@@ -37,18 +37,18 @@ bool StepParts::areAllowed(const IslandInput& whole) {
     if (!whole.contacts || whole.inOnePiece) return false;
     if (std::all_of(whole.bodies.begin(), whole.bodies.end(), isPrescribed)) return true;
     const double most = kSteady * whole.h * whole.gravity.norm();
-    const auto stays = [most](double opening) { return opening <= most; };
+    const auto staysClosed = [most](double opening) { return opening <= most; };
     const auto isBorneEvenly = [&](const CoupledBody& body) {
         return body.prescribed ||
                std::all_of(body.supports.begin(), body.supports.end(), [&](const BodySupport& support) {
-                   return stays(support.row.dot(body.startTwist) - support.velocity) &&
-                          stays(support.row.dot(body.freeTwist) - support.velocity);
+                   return staysClosed(support.row.dot(body.startTwist) - support.velocity) &&
+                          staysClosed(support.row.dot(body.freeTwist) - support.velocity);
                });
     };
     const auto keepsClosed = [&](const RigidContact& pair) {
         const CoupledBody &a = whole.bodies[pair.a], &b = whole.bodies[pair.b];
-        return stays(pair.rowA.dot(a.startTwist) + pair.rowB.dot(b.startTwist) - pair.velocity) &&
-               stays(pair.rowA.dot(a.freeTwist) + pair.rowB.dot(b.freeTwist) - pair.velocity);
+        return staysClosed(pair.rowA.dot(a.startTwist) + pair.rowB.dot(b.startTwist) - pair.velocity) &&
+               staysClosed(pair.rowA.dot(a.freeTwist) + pair.rowB.dot(b.freeTwist) - pair.velocity);
     };
     return whole.couplings.empty() && std::all_of(whole.bodies.begin(), whole.bodies.end(), isBorneEvenly) &&
            std::all_of(whole.rigidContacts.begin(), whole.rigidContacts.end(), keepsClosed);

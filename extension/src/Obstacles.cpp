@@ -9,6 +9,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "BodyTwist.h"
 #include "Checks.h"
 #include "CoupledLinks.h"
 #include "RigidContacts.h"

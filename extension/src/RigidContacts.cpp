@@ -7,6 +7,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "BodyTwist.h"
 #include "Checks.h"
 #include "Obstacles.h"
 #include "jacket/Types.h"
@@ -46,12 +47,6 @@ const btCollisionObject* otherThan(const btCollisionObject& object, const btPers
     return manifold.getBody0() == &object ? manifold.getBody1() : manifold.getBody0();
 }
 
-/// Velocity that a body's point will have after the coming step if nothing touches the body.
-Vec3 pointVelocity(const btRigidBody& body, const Vec3& at, double h) {
-    const Vec6 twist = body.isStaticOrKinematicObject() ? twistOf(body) : freeTwistOf(body, h);
-    return twist.head<3>() + twist.tail<3>().cross(at - fromBullet(body.getCenterOfMassPosition()));
-}
-
 /// The most by which points of two objects approach each other, roughly [m/s].
 double speedBetween(const btCollisionObject& a, const btCollisionObject& b) {
     Vec3 between = Vec3::Zero();
@@ -80,26 +75,32 @@ double weightBetween(const btCollisionObject& a, const btCollisionObject& b) {
     return kSupport * std::min(linearMassOf(*btRigidBody::upcast(&a)), linearMassOf(*btRigidBody::upcast(&b)));
 }
 
+/// Of what holds a body at one of the points where the two touch. What is not held itself, though it may sleep, gives
+/// way: its mass is spread over them.
+double weightUnder(const btRigidBody& body, const btCollisionObject& other, double points) {
+    const btRigidBody* under = btRigidBody::upcast(&other);
+    const bool isHeld = !under || under->isStaticOrKinematicObject();
+    return isHeld ? kSupport * linearMassOf(body) : linearMassOf(*under) / points;
+}
+
 /// Velocity of a body's point along a direction, from its twist.
 Vec6 rowOf(const Vec3& direction, const Vec3& at, const Vec3& centre) {
     return (Vec6() << direction, (at - centre).cross(direction)).finished();
 }
 
+/// Adds them to the body's mass and momentum.
+void holdBySupports(CoupledBody& body, const std::vector<BodySupport>& supports) {
+    body.supports = supports;
+    if (supports.empty()) return;
+    Vec6 momentum = body.mass * body.freeTwist;
+    for (const auto& [row, velocity, weight] : supports) {
+        body.mass += weight * row * row.transpose();
+        momentum += weight * velocity * row;
+    }
+    body.freeTwist = body.mass.ldlt().solve(momentum);
+}
+
 }  // namespace
-
-Vec6 twistOf(const btRigidBody& body) {
-    Vec6 twist;
-    twist << fromBullet(body.getLinearVelocity()), fromBullet(body.getAngularVelocity());
-    return twist;
-}
-
-Vec6 freeTwistOf(const btRigidBody& body, double h) {
-    Vec6 twist = twistOf(body);
-    if (!body.isActive()) return twist;
-    twist.head<3>() += h * double(body.getInvMass()) * fromBullet(body.getTotalForce());
-    twist.tail<3>() += h * (fromBullet(body.getInvInertiaTensorWorld()) * fromBullet(body.getTotalTorque()));
-    return twist;
-}
 
 void RigidContacts::index() {
     btDispatcher& dispatcher = *m_world.getDispatcher();
@@ -131,15 +132,15 @@ void RigidContacts::foresee(const btCollisionObject& body) {
     if (near == m_near.end()) return;
     const double kick = m_h * double(m_world.getGravity().length());
     for (const btCollisionObject* other : near->second) {
-        const auto isOther = [&](const btPersistentManifold* manifold) { return otherThan(body, *manifold) == other; };
+        if (m_foreseen.count(other) > 0 || defectOf(*other)) continue;
         const std::span<btPersistentManifold* const> loaded = manifoldsOf(body);
-        const bool isLoaded = std::any_of(loaded.begin(), loaded.end(), isOther);
-        const bool isKnown = std::any_of(m_impacts.begin(), m_impacts.end(), [&](const RigidImpact& impact) {
-            return impact.first == other && impact.second == &body;
+        const bool isLoaded = std::any_of(loaded.begin(), loaded.end(), [&](const btPersistentManifold* manifold) {
+            return otherThan(body, *manifold) == other;
         });
-        if (isKnown || defectOf(*other) || (isLoaded && speedBetween(body, *other) < kick)) continue;
+        if (isLoaded && speedBetween(body, *other) < kick) continue;
         foreseeImpact(m_world, body, *other, m_h, isLoaded ? kick : 0.0, m_impacts);
     }
+    m_foreseen.insert(&body);
 }
 
 std::span<btPersistentManifold* const> RigidContacts::manifoldsOf(const btCollisionObject& object) const {
@@ -150,7 +151,7 @@ std::span<btPersistentManifold* const> RigidContacts::manifoldsOf(const btCollis
 
 /// How fast the two are to part at least, where they bore load before [m/s]. What rests sinks in by a little, at one
 /// corner and another by turns: that is no push.
-double RigidContacts::openingOf(const btPersistentManifold& manifold, const btManifoldPoint& point) const {
+double RigidContacts::pushOf(const btPersistentManifold& manifold, const btManifoldPoint& point) const {
     constexpr double kDeep = 1e-3;  // [m]
     const double distance = distanceOf(manifold, point);
     return m_h > 0.0 && distance < -kDeep ? speedApart(m_world.getSolverInfo(), distance, m_h) : 0.0;
@@ -182,45 +183,35 @@ std::pmr::vector<btCollisionObject*> RigidContacts::join(std::span<btCollisionOb
 void RigidContacts::addSupports(const btRigidBody& body, CoupledBody& coupled,
                                 std::vector<BodySupport>& supports) const {
     supports.clear();
-    const auto add = [&](const btRigidBody* other, const Vec3& n, const Vec3& at, double opening, double weight) {
-        const double velocity = other ? pointVelocity(*other, at, m_h).dot(n) : 0.0;
+    const auto areJoined = [&](const btCollisionObject& other) {
+        return m_joined.count(&body) > 0 && m_joined.count(&other) > 0;
+    };
+    const auto add = [&](const btCollisionObject& other, const Vec3& n, const Vec3& at, double opening, double weight) {
+        const double velocity = pointVelocity(other, at, m_h).dot(n);
         supports.push_back({rowOf(n, at, coupled.position), velocity + opening, weight});
     };
     for (const btPersistentManifold* manifold : manifoldsOf(body)) {
-        const btCollisionObject* otherObject = otherThan(body, *manifold);
-        if (m_joined.count(&body) > 0 && m_joined.count(otherObject) > 0) continue;
+        const btCollisionObject& other = *otherThan(body, *manifold);
+        if (areJoined(other)) continue;
         const bool first = manifold->getBody0() == &body;
-        const auto* other = btRigidBody::upcast(otherObject);
-        const double weight =  // a free body's is spread over its points
-            isFree(*otherObject) ? linearMassOf(*other) / loadedPoints(*manifold) : kSupport * linearMassOf(body);
+        const double weight = weightUnder(body, other, loadedPoints(*manifold));
         for (int k = 0; k < manifold->getNumContacts(); ++k) {
             const btManifoldPoint& point = manifold->getContactPoint(k);
             if (!bears(point)) continue;
             const Vec3 n = (first ? 1.0 : -1.0) * fromBullet(point.m_normalWorldOnB);
             const Vec3 at = fromBullet(first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
-            add(other, n, at, openingOf(*manifold, point), weight);
+            add(other, n, at, pushOf(*manifold, point), weight);
         }
     }
     for (const RigidImpact& impact : m_impacts) {
-        if (impact.first != &body && impact.second != &body) continue;
         const bool first = impact.first == &body;
-        const btCollisionObject* otherObject = first ? impact.second : impact.first;
-        if (m_joined.count(&body) > 0 && m_joined.count(otherObject) > 0) continue;
-        const auto* other = btRigidBody::upcast(otherObject);
-        const bool isHeld = !other || other->isStaticOrKinematicObject();  // one that sleeps will wake
-        const double weight =
-            isHeld ? kSupport * linearMassOf(body) : linearMassOf(*other) / double(impact.points.size());
+        const btCollisionObject& other = first ? *impact.second : *impact.first;
+        if ((!first && impact.second != &body) || areJoined(other)) continue;
+        const double weight = weightUnder(body, other, double(impact.points.size()));
         for (const auto& [onFirst, onSecond, normal, opening] : impact.points)
             add(other, first ? normal : Vec3(-normal), first ? onFirst : onSecond, opening, weight);
     }
-    coupled.supports = supports;
-    if (supports.empty()) return;
-    Vec6 momentum = coupled.mass * coupled.freeTwist;
-    for (const auto& [row, velocity, weight] : supports) {
-        coupled.mass += weight * row * row.transpose();
-        momentum += weight * velocity * row;
-    }
-    coupled.freeTwist = coupled.mass.ldlt().solve(momentum);
+    holdBySupports(coupled, supports);
 }
 
 std::pmr::vector<RigidContact> RigidContacts::between(std::span<const Obstacle> obstacles) const {
@@ -241,7 +232,7 @@ std::pmr::vector<RigidContact> RigidContacts::between(std::span<const Obstacle> 
                 const Vec3 n = fromBullet(point.m_normalWorldOnB);
                 contacts.push_back({b, other->second, rowOf(n, fromBullet(point.getPositionWorldOnA()), first.position),
                                     rowOf(-n, fromBullet(point.getPositionWorldOnB()), second.position), weight,
-                                    openingOf(*manifold, point)});
+                                    pushOf(*manifold, point)});
             }
         }
     }

@@ -17,11 +17,6 @@ namespace jacket::bullet {
 
 struct Obstacle;
 
-/// Linear and angular velocity of a body, now and after the coming step if nothing touches it: forces as they stand,
-/// gravity included.
-Vec6 twistOf(const btRigidBody& body);
-Vec6 freeTwistOf(const btRigidBody& body, double h);
-
 /// The contacts that Bullet found among bodies and that bore load in its last solve. They hold in the shells' solve
 /// too, or a shell would press a supported box through the floor, and feel only the lowest one of a pile. So do the
 /// impacts of the coming step, or a body would be stopped, or thrown, into the shells that touch it.
@@ -34,6 +29,7 @@ class RigidContacts {
           m_memory(memory),
           m_manifolds(&memory),
           m_near(&memory),
+          m_foreseen(&memory),
           m_impacts(&memory),
           m_joined(&memory) {}
     /// To be called first. The free bodies of the piles that these belong to, up to a number that a solve can carry.
@@ -52,7 +48,7 @@ class RigidContacts {
     using Manifolds = std::pmr::vector<btPersistentManifold*>;
     std::span<btPersistentManifold* const> manifoldsOf(const btCollisionObject& object) const;
 
-    double openingOf(const btPersistentManifold& manifold, const btManifoldPoint& point) const;
+    double pushOf(const btPersistentManifold& manifold, const btManifoldPoint& point) const;
 
     btDynamicsWorld& m_world;
     double m_h;
@@ -60,6 +56,7 @@ class RigidContacts {
     std::pmr::unordered_map<const btCollisionObject*, Manifolds> m_manifolds;
     /// By Bullet's broadphase, of every free object: what may meet it.
     std::pmr::unordered_map<const btCollisionObject*, std::pmr::vector<btCollisionObject*>> m_near;
+    std::pmr::unordered_set<const btCollisionObject*> m_foreseen;  ///< bodies whose impacts are in m_impacts
     std::pmr::vector<RigidImpact> m_impacts;
     std::pmr::unordered_set<const btCollisionObject*> m_joined;
 };

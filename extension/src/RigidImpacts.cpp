@@ -5,22 +5,15 @@
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>
-#include <BulletDynamics/Dynamics/btRigidBody.h>
 
 #include <algorithm>
 #include <utility>
 
+#include "BodyTwist.h"
 #include "Convert.h"
 
 namespace jacket::bullet {
 namespace {
-
-/// Velocity of an object's point as it is now.
-Vec3 velocityAt(const btCollisionObject& object, const Vec3& at) {
-    const btRigidBody* body = btRigidBody::upcast(&object);
-    if (!body) return Vec3::Zero();
-    return fromBullet(body->getVelocityInLocalPoint(toBullet(at) - body->getCenterOfMassPosition()));
-}
 
 /// Bullet's answer to a touch: what is apart may close the gap, what is not is pushed out, and what comes fast enough
 /// bounces.
@@ -48,7 +41,7 @@ class ImpactFinder : public btManifoldResult {
         const Vec3 normal = (isSwapped ? -1.0 : 1.0) * fromBullet(normalOnB);
         const Vec3 &onFirst = isSwapped ? own : other, &onSecond = isSwapped ? other : own;
         const double parting =
-            normal.dot(velocityAt(*m_impact.first, onFirst) - velocityAt(*m_impact.second, onSecond));
+            normal.dot(pointVelocity(*m_impact.first, onFirst, 0.0) - pointVelocity(*m_impact.second, onSecond, 0.0));
         const double opening = openingOf(m_solver, double(distance), -parting, m_restitution, m_h);
         if (parting < opening - m_least) m_impact.points.push_back({onFirst, onSecond, normal, opening});
     }

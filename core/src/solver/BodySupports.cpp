@@ -12,7 +12,7 @@ constexpr double kPull = 1e-2;   // of a body's weight, or of what is pressed on
 constexpr int kMostReturns = 1;  // a contact that has let go twice stays away: it closes in the bodies' own step
 
 /// How fast a pair opens, beyond what it is to.
-double openingOf(const RigidContact& pair, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) {
+double surplusOpening(const RigidContact& pair, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) {
     return pair.rowA.dot(w.col(pair.a)) + pair.rowB.dot(w.col(pair.b)) - pair.velocity;
 }
 
@@ -150,7 +150,7 @@ void BodySupports::findLoads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) 
             most[body] = std::max(most[body], contact.weight * (contact.velocity - contact.row.dot(w.col(body))));
     for (const auto& [contact, hold] : m_pairs) {
         if (!hold.holds) continue;
-        const double load = -contact.weight * openingOf(contact, w);
+        const double load = -contact.weight * surplusOpening(contact, w);
         most[contact.a] = std::max(most[contact.a], load);
         most[contact.b] = std::max(most[contact.b], load);
     }
@@ -174,7 +174,7 @@ bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, dou
     for (Pair& pair : m_pairs) {
         const int a = pair.contact.a, b = pair.contact.b;
         const double pull = kPull * std::max(std::min(lightest(a), lightest(b)) * kick, std::min(load[a], load[b]));
-        if (!pair.hold.turn(openingOf(pair.contact, w), pull / pair.contact.weight)) continue;
+        if (!pair.hold.turn(surplusOpening(pair.contact, w), pull / pair.contact.weight)) continue;
         add(pair, pair.hold.holds ? 1.0 : -1.0);
         changed = true;
     }

@@ -1,0 +1,17 @@
+#pragma once
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include "jacket/Types.h"
+
+namespace jacket::bullet {
+
+/// Linear and angular velocity of a body, now and after the coming step if nothing touches it: forces as they stand,
+/// gravity included.
+Vec6 twistOf(const btRigidBody& body);
+Vec6 freeTwistOf(const btRigidBody& body, double h);
+
+/// Velocity that a point of an object, which is at `at` in the world now, will have after a step of length h if nothing
+/// touches the object; 0: the velocity that it has.
+Vec3 pointVelocity(const btCollisionObject& object, const Vec3& at, double h);
+
+}  // namespace jacket::bullet
