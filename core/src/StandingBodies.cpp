@@ -28,7 +28,7 @@ bool StandingBodies::find(const IslandInput& given) {
             m_bodies[b].prescribed = true;
     }
     const auto drops = [&](const RigidContact& c) {
-        return dropUnborne(c.a, c.b, c.rowA) || dropUnborne(c.b, c.a, c.rowB);
+        return dropUnborne(c.a, c.b, c, c.rowA) || dropUnborne(c.b, c.a, c, c.rowB);
     };
     while (std::any_of(given.rigidContacts.begin(), given.rigidContacts.end(), drops)) continue;
     bool isAny = false;
@@ -74,11 +74,10 @@ bool StandingBodies::isOnShell(const IslandInput& given, int body) {
     });
 }
 
-/// What lies on a body that does not stand does not either. `row`: how fast the two part, from the body's twist. True
-/// if that is so.
-bool StandingBodies::dropUnborne(int body, int below, const Vec6& row) {
+/// What lies on a body that does not stand, or is joined to it, does not either. `row`: the body's. True if that is so.
+bool StandingBodies::dropUnborne(int body, int below, const RigidContact& contact, const Vec6& row) {
     if (m_given->bodies[body].prescribed || !m_bodies[body].prescribed || m_bodies[below].prescribed) return false;
-    if (RigidContact::bears(row, m_given->gravity)) return false;
+    if (!contact.range.pulls() && contact.bears(row, m_given->gravity)) return false;
     m_bodies[body].prescribed = false;
     return true;
 }

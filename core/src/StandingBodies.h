@@ -24,7 +24,7 @@ class StandingBodies {
     void number(const IslandInput& given);
     bool stands(const IslandInput& given, int body) const;
     bool isOnShell(const IslandInput& given, int body);
-    bool dropUnborne(int body, int below, const Vec6& row);
+    bool dropUnborne(int body, int below, const RigidContact& contact, const Vec6& row);
 
     const IslandInput* m_given = nullptr;
     IslandInput m_input;

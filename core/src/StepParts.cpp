@@ -41,14 +41,15 @@ bool StepParts::areAllowed(const IslandInput& whole) {
     const auto isBorneEvenly = [&](const CoupledBody& body) {
         return body.prescribed ||
                std::all_of(body.supports.begin(), body.supports.end(), [&](const BodySupport& support) {
-                   return staysClosed(support.row.dot(body.startTwist) - support.velocity) &&
-                          staysClosed(support.row.dot(body.freeTwist) - support.velocity);
+                   return support.range.pulls() || (staysClosed(support.row.dot(body.startTwist) - support.velocity) &&
+                                                    staysClosed(support.row.dot(body.freeTwist) - support.velocity));
                });
     };
     const auto keepsClosed = [&](const RigidContact& pair) {
         const CoupledBody &a = whole.bodies[pair.a], &b = whole.bodies[pair.b];
-        return staysClosed(pair.rowA.dot(a.startTwist) + pair.rowB.dot(b.startTwist) - pair.velocity) &&
-               staysClosed(pair.rowA.dot(a.freeTwist) + pair.rowB.dot(b.freeTwist) - pair.velocity);
+        return pair.range.pulls() ||
+               (staysClosed(pair.rowA.dot(a.startTwist) + pair.rowB.dot(b.startTwist) - pair.velocity) &&
+                staysClosed(pair.rowA.dot(a.freeTwist) + pair.rowB.dot(b.freeTwist) - pair.velocity));
     };
     return whole.couplings.empty() && std::all_of(whole.bodies.begin(), whole.bodies.end(), isBorneEvenly) &&
            std::all_of(whole.rigidContacts.begin(), whole.rigidContacts.end(), keepsClosed);
@@ -60,8 +61,12 @@ StepParts::StepParts(const IslandInput& whole, const StepReport& failed)
       m_bodies(whole.bodies.begin(), whole.bodies.end()),
       m_anchors(whole.anchors.begin(), whole.anchors.end()) {
     for (const Shell* shell : whole.shells) m_start.push_back({shell->m_x, shell->m_v, shell->m_pinTarget});
+    for (const CoupledBody& body : m_bodies) m_supports.emplace_back(body.supports.begin(), body.supports.end());
+    for (std::size_t b = 0; b < m_bodies.size(); ++b) m_bodies[b].supports = m_supports[b];
+    m_rigidContacts.assign(whole.rigidContacts.begin(), whole.rigidContacts.end());
     m_part.bodies = m_bodies;
     m_part.anchors = m_anchors;
+    m_part.rigidContacts = m_rigidContacts;
     for (CoupledBody& body : whole.bodies) body.impulse = body.motion = Vec6::Zero();
     for (Anchor& anchor : whole.anchors) anchor.impulse.setZero();
     shorten(failed);
@@ -94,12 +99,16 @@ void StepParts::shorten(const StepReport& failed) {
 /// What the whole step does to pins and free bodies, by the part. A body's inertia stays as it was at the start.
 void StepParts::begin() {
     m_part.h = m_whole.h * m_length / kTicks;
-    const double share = double(m_length) / (kTicks - m_ticks);
+    const double share = double(m_length) / (kTicks - m_ticks), part = m_part.h / m_whole.h;
     for (std::size_t b = 0; b < m_bodies.size(); ++b) {
         const CoupledBody& given = m_whole.bodies[b];
         if (given.prescribed) continue;
-        m_bodies[b].freeTwist = freeTwistOf(given, m_bodies[b].startTwist, m_part.h / m_whole.h);
+        m_bodies[b].freeTwist = freeTwistOf(given, m_bodies[b].startTwist, part);
+        for (std::size_t i = 0; i < m_supports[b].size(); ++i)
+            m_supports[b][i].range = given.supports[i].range.part(part);
     }
+    for (std::size_t i = 0; i < m_rigidContacts.size(); ++i)
+        m_rigidContacts[i].range = m_whole.rigidContacts[i].range.part(part);
     for (std::size_t k = 0; k < m_start.size(); ++k) {
         Shell& shell = *m_whole.shells[k];
         for (auto& [vertex, target] : shell.m_pinTarget)

@@ -45,6 +45,8 @@ class StepParts {
     IslandInput m_part;
     std::vector<Start> m_start;  ///< of each shell
     std::vector<CoupledBody> m_bodies;
+    std::vector<std::vector<BodySupport>> m_supports;  ///< of each body
+    std::vector<RigidContact> m_rigidContacts;
     std::vector<Anchor> m_anchors;
     int m_ticks = 0;        ///< that are done
     int m_length = kTicks;  ///< of the next part

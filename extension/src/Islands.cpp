@@ -84,7 +84,7 @@ std::pmr::vector<int> IslandFinder::leaders(std::span<const Obstacle> obstacles,
 }
 
 std::pmr::vector<Island> IslandFinder::find(double h, bool hasMoved) {
-    RigidContacts contacts(m_world, hasMoved ? 0.0 : h, m_memory);
+    RigidContacts contacts(m_world, h, hasMoved, m_memory);
     std::pmr::vector<btCollisionObject*> objects(&m_memory);
     for (const Neighbour& n : m_neighbours) objects.push_back(n.object);
     for (btCollisionObject* object : contacts.join(objects)) m_neighbours.push_back(makeNeighbour(*object));
@@ -133,7 +133,7 @@ std::pmr::vector<Island> IslandFinder::find(double h, bool hasMoved) {
         for (const auto& c : rigidContacts)
             if (bodyIn[i][c.a] >= 0)
                 islands[i].rigidContacts.push_back(
-                    {bodyIn[i][c.a], bodyIn[i][c.b], c.rowA, c.rowB, c.weight, c.velocity});
+                    {bodyIn[i][c.a], bodyIn[i][c.b], c.rowA, c.rowB, c.weight, c.velocity, c.range});
     }
     return islands;
 }

@@ -93,7 +93,7 @@ void holdBySupports(CoupledBody& body, const std::vector<BodySupport>& supports)
     body.supports = supports;
     if (supports.empty()) return;
     Vec6 momentum = body.mass * body.freeTwist;
-    for (const auto& [row, velocity, weight] : supports) {
+    for (const auto& [row, velocity, weight, range] : supports) {
         body.mass += weight * row * row.transpose();
         momentum += weight * velocity * row;
     }
@@ -125,6 +125,14 @@ void RigidContacts::indexNear() {
     }
 }
 
+void RigidContacts::indexJoints() {
+    for (int i = 0; i < m_world.getNumConstraints(); ++i) {
+        btTypedConstraint* joint = m_world.getConstraint(i);
+        m_jointsOf[&joint->getRigidBodyA()].push_back(joint);
+        m_jointsOf[&joint->getRigidBodyB()].push_back(joint);
+    }
+}
+
 /// What a body will meet, but for what was looked at from the other side. Where two have borne load before they touch
 /// by other points only if one of them tumbles.
 void RigidContacts::foresee(const btCollisionObject& body) {
@@ -132,7 +140,7 @@ void RigidContacts::foresee(const btCollisionObject& body) {
     if (near == m_near.end()) return;
     const double kick = m_h * double(m_world.getGravity().length());
     for (const btCollisionObject* other : near->second) {
-        if (m_foreseen.count(other) > 0 || defectOf(*other)) continue;
+        if (m_seen.count(other) > 0 || defectOf(*other)) continue;
         const std::span<btPersistentManifold* const> loaded = manifoldsOf(body);
         const bool isLoaded = std::any_of(loaded.begin(), loaded.end(), [&](const btPersistentManifold* manifold) {
             return otherThan(body, *manifold) == other;
@@ -140,7 +148,28 @@ void RigidContacts::foresee(const btCollisionObject& body) {
         if (isLoaded && speedBetween(body, *other) < kick) continue;
         foreseeImpact(m_world, body, *other, m_h, isLoaded ? kick : 0.0, m_impacts);
     }
-    m_foreseen.insert(&body);
+}
+
+/// But for those that were read from the other side.
+void RigidContacts::readJoints(const btCollisionObject& body) {
+    const auto joints = m_jointsOf.find(&body);
+    if (joints == m_jointsOf.end()) return;
+    for (btTypedConstraint* joint : joints->second) {
+        const btRigidBody &first = joint->getRigidBodyA(), &second = joint->getRigidBodyB();
+        const btRigidBody& other = &first == &body ? second : first;
+        if (&other == &body || m_seen.count(&other) > 0 || defectOf(other)) continue;
+        const std::size_t known = m_joints.size();
+        readJoint(*joint, m_world.getSolverInfo(), m_h, m_joints);
+        if (!m_hasMoved) continue;
+        for (std::size_t i = known; i < m_joints.size(); ++i)  // it has done what it does
+            m_joints[i].velocity =
+                m_joints[i].alongFirst.dot(twistAhead(first)) + m_joints[i].alongSecond.dot(twistAhead(second));
+    }
+}
+
+/// At the end of the step if nothing touches the body.
+Vec6 RigidContacts::twistAhead(const btRigidBody& body) const {
+    return m_hasMoved || body.isStaticOrKinematicObject() ? twistOf(body) : freeTwistOf(body, m_h);
 }
 
 std::span<btPersistentManifold* const> RigidContacts::manifoldsOf(const btCollisionObject& object) const {
@@ -154,7 +183,7 @@ std::span<btPersistentManifold* const> RigidContacts::manifoldsOf(const btCollis
 double RigidContacts::pushOf(const btPersistentManifold& manifold, const btManifoldPoint& point) const {
     constexpr double kDeep = 1e-3;  // [m]
     const double distance = distanceOf(manifold, point);
-    return m_h > 0.0 && distance < -kDeep ? speedApart(m_world.getSolverInfo(), distance, m_h) : 0.0;
+    return !m_hasMoved && distance < -kDeep ? speedApart(m_world.getSolverInfo(), distance, m_h) : 0.0;
 }
 
 std::pmr::vector<btCollisionObject*> RigidContacts::join(std::span<btCollisionObject* const> bodies) {
@@ -163,7 +192,8 @@ std::pmr::vector<btCollisionObject*> RigidContacts::join(std::span<btCollisionOb
         if (isFree(*body) && m_joined.insert(body).second) pile.push_back(body);
     if (pile.empty()) return fresh;  // most shells touch what stands still
     index();
-    if (m_h > 0.0) indexNear();
+    indexJoints();
+    if (!m_hasMoved) indexNear();
     const auto add = [&](const btCollisionObject* object) {
         auto* other = const_cast<btCollisionObject*>(object);
         if (m_joined.size() >= kMostJoined || !isFree(*other) || defectOf(*other) || !m_joined.insert(other).second)
@@ -176,23 +206,32 @@ std::pmr::vector<btCollisionObject*> RigidContacts::join(std::span<btCollisionOb
         const std::size_t known = m_impacts.size();
         foresee(*pile[next]);
         for (std::size_t i = known; i < m_impacts.size(); ++i) add(m_impacts[i].second);
+        const std::size_t rows = m_joints.size();
+        readJoints(*pile[next]);
+        for (std::size_t i = rows; i < m_joints.size(); ++i)
+            add(m_joints[i].first == pile[next] ? m_joints[i].second : m_joints[i].first);
+        m_seen.insert(pile[next]);
     }
     return fresh;
+}
+
+bool RigidContacts::areJoined(const btCollisionObject& a, const btCollisionObject& b) const {
+    return m_joined.count(&a) > 0 && m_joined.count(&b) > 0;
 }
 
 void RigidContacts::addSupports(const btRigidBody& body, CoupledBody& coupled,
                                 std::vector<BodySupport>& supports) const {
     supports.clear();
-    const auto areJoined = [&](const btCollisionObject& other) {
-        return m_joined.count(&body) > 0 && m_joined.count(&other) > 0;
-    };
-    const auto add = [&](const btCollisionObject& other, const Vec3& n, const Vec3& at, double opening, double weight) {
-        const double velocity = pointVelocity(other, at, m_h).dot(n);
-        supports.push_back({rowOf(n, at, coupled.position), velocity + opening, weight});
-    };
+    addLoaded(body, coupled.position, supports);
+    addImpacts(body, coupled.position, supports);
+    addJoints(body, supports);
+    holdBySupports(coupled, supports);
+}
+
+void RigidContacts::addLoaded(const btRigidBody& body, const Vec3& centre, std::vector<BodySupport>& supports) const {
     for (const btPersistentManifold* manifold : manifoldsOf(body)) {
         const btCollisionObject& other = *otherThan(body, *manifold);
-        if (areJoined(other)) continue;
+        if (areJoined(body, other)) continue;
         const bool first = manifold->getBody0() == &body;
         const double weight = weightUnder(body, other, loadedPoints(*manifold));
         for (int k = 0; k < manifold->getNumContacts(); ++k) {
@@ -200,42 +239,45 @@ void RigidContacts::addSupports(const btRigidBody& body, CoupledBody& coupled,
             if (!bears(point)) continue;
             const Vec3 n = (first ? 1.0 : -1.0) * fromBullet(point.m_normalWorldOnB);
             const Vec3 at = fromBullet(first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
-            add(other, n, at, pushOf(*manifold, point), weight);
+            const double velocity = pointVelocity(other, at, ahead()).dot(n) + pushOf(*manifold, point);
+            supports.push_back({rowOf(n, at, centre), velocity, weight});
         }
     }
+}
+
+void RigidContacts::addImpacts(const btRigidBody& body, const Vec3& centre, std::vector<BodySupport>& supports) const {
     for (const RigidImpact& impact : m_impacts) {
         const bool first = impact.first == &body;
         const btCollisionObject& other = first ? *impact.second : *impact.first;
-        if ((!first && impact.second != &body) || areJoined(other)) continue;
+        if ((!first && impact.second != &body) || areJoined(body, other)) continue;
         const double weight = weightUnder(body, other, double(impact.points.size()));
-        for (const auto& [onFirst, onSecond, normal, opening] : impact.points)
-            add(other, first ? normal : Vec3(-normal), first ? onFirst : onSecond, opening, weight);
+        for (const auto& [onFirst, onSecond, normal, opening] : impact.points) {
+            const Vec3 n = first ? normal : Vec3(-normal);
+            const Vec3& at = first ? onFirst : onSecond;
+            supports.push_back({rowOf(n, at, centre), pointVelocity(other, at, ahead()).dot(n) + opening, weight});
+        }
     }
-    holdBySupports(coupled, supports);
+}
+
+void RigidContacts::addJoints(const btRigidBody& body, std::vector<BodySupport>& supports) const {
+    for (const JointRow& row : m_joints) {
+        const bool first = row.first == &body;
+        const btRigidBody& other = first ? *row.second : *row.first;
+        if ((!first && row.second != &body) || areJoined(body, other)) continue;
+        const Vec6 &own = first ? row.alongFirst : row.alongSecond, &others = first ? row.alongSecond : row.alongFirst;
+        const double give = std::max(mobilityAlong(other, others), mobilityAlong(body, own) / kSupport);
+        const double velocity = row.velocity - others.dot(twistAhead(other));
+        supports.push_back({own, velocity, 1.0 / (give + row.ease), row.range});
+    }
 }
 
 std::pmr::vector<RigidContact> RigidContacts::between(std::span<const Obstacle> obstacles) const {
-    std::pmr::unordered_map<const btCollisionObject*, int> indexOf(&m_memory);
+    ObstacleIndex indexOf(&m_memory);
     for (int b = 0; b < static_cast<int>(obstacles.size()); ++b)
         if (m_joined.count(obstacles[b].object) > 0) indexOf[obstacles[b].object] = b;
     std::pmr::vector<RigidContact> contacts(&m_memory);
-    for (int b = 0; b < static_cast<int>(obstacles.size()); ++b) {
-        if (indexOf.count(obstacles[b].object) == 0) continue;
-        for (const btPersistentManifold* manifold : manifoldsOf(*obstacles[b].object)) {
-            const auto other = indexOf.find(manifold->getBody1());
-            if (manifold->getBody0() != obstacles[b].object || other == indexOf.end()) continue;
-            const CoupledBody &first = obstacles[b].body, &second = obstacles[other->second].body;
-            const double weight = weightBetween(*manifold->getBody0(), *manifold->getBody1());
-            for (int k = 0; k < manifold->getNumContacts(); ++k) {
-                const btManifoldPoint& point = manifold->getContactPoint(k);
-                if (!bears(point) && point.getDistance() > btScalar(0)) continue;  // corners bear load by turns
-                const Vec3 n = fromBullet(point.m_normalWorldOnB);
-                contacts.push_back({b, other->second, rowOf(n, fromBullet(point.getPositionWorldOnA()), first.position),
-                                    rowOf(-n, fromBullet(point.getPositionWorldOnB()), second.position), weight,
-                                    pushOf(*manifold, point)});
-            }
-        }
-    }
+    for (int b = 0; b < static_cast<int>(obstacles.size()); ++b)
+        if (indexOf.count(obstacles[b].object) > 0) addLoadedBetween(obstacles, b, indexOf, contacts);
     for (const RigidImpact& impact : m_impacts) {
         const auto first = indexOf.find(impact.first), second = indexOf.find(impact.second);
         if (first == indexOf.end() || second == indexOf.end()) continue;
@@ -245,7 +287,33 @@ std::pmr::vector<RigidContact> RigidContacts::between(std::span<const Obstacle> 
                                 rowOf(normal, onFirst, obstacles[first->second].body.position),
                                 rowOf(-normal, onSecond, obstacles[second->second].body.position), weight, opening});
     }
+    for (const JointRow& row : m_joints) {
+        const auto first = indexOf.find(row.first), second = indexOf.find(row.second);
+        if (first == indexOf.end() || second == indexOf.end()) continue;
+        const double mobility = mobilityAlong(*row.first, row.alongFirst) + mobilityAlong(*row.second, row.alongSecond);
+        contacts.push_back({first->second, second->second, row.alongFirst, row.alongSecond,
+                            1.0 / (mobility / kSupport + row.ease), row.velocity, row.range});
+    }
     return contacts;
+}
+
+/// What bears load, or nearly does, between one of the obstacles, as the first of a manifold, and others.
+void RigidContacts::addLoadedBetween(std::span<const Obstacle> obstacles, int own, const ObstacleIndex& indexOf,
+                                     std::pmr::vector<RigidContact>& contacts) const {
+    for (const btPersistentManifold* manifold : manifoldsOf(*obstacles[own].object)) {
+        const auto other = indexOf.find(manifold->getBody1());
+        if (manifold->getBody0() != obstacles[own].object || other == indexOf.end()) continue;
+        const CoupledBody &first = obstacles[own].body, &second = obstacles[other->second].body;
+        const double weight = weightBetween(*manifold->getBody0(), *manifold->getBody1());
+        for (int k = 0; k < manifold->getNumContacts(); ++k) {
+            const btManifoldPoint& point = manifold->getContactPoint(k);
+            if (!bears(point) && point.getDistance() > btScalar(0)) continue;  // corners bear load by turns
+            const Vec3 n = fromBullet(point.m_normalWorldOnB);
+            contacts.push_back({own, other->second, rowOf(n, fromBullet(point.getPositionWorldOnA()), first.position),
+                                rowOf(-n, fromBullet(point.getPositionWorldOnB()), second.position), weight,
+                                pushOf(*manifold, point)});
+        }
+    }
 }
 
 }  // namespace jacket::bullet

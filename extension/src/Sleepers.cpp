@@ -48,11 +48,10 @@ bool isQuiet(const btCollisionObject& object) {
     return btRigidBody::upcast(&object) && mayFallAsleep(object);
 }
 
-/// Whether a rigid contact of an island bears one of its bodies on another one.
+/// Whether a rigid contact or a joint of an island bears one of its bodies on another one.
 bool liesOnAnother(const Island& island, int body, const Vec3& gravity) {
     return std::any_of(island.rigidContacts.begin(), island.rigidContacts.end(), [&](const RigidContact& pair) {
-        return (pair.a == body && RigidContact::bears(pair.rowB, gravity)) ||
-               (pair.b == body && RigidContact::bears(pair.rowA, gravity));
+        return (pair.a == body && pair.bears(pair.rowB, gravity)) || (pair.b == body && pair.bears(pair.rowA, gravity));
     });
 }
 

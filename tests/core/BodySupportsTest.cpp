@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 namespace jacket {
 namespace {
 
@@ -128,6 +132,56 @@ TEST(BodySupports, WhatALiftedBodyRestedOnDoesNotHoldItBack) {
     EXPECT_NEAR(twist[5], (6.0 - 1.0) / 2.0, 1e-3);
     supports.begin(bodies, {}, {}, {0});
     EXPECT_LT(supports.respond(-lift, 1.0).norm(), 1e-3);  // pressed, it stays
+}
+
+/// A joint holds what is pulled as well as what is pressed.
+TEST(BodySupports, AJointHoldsEitherWay) {
+    constexpr double kInfinite = std::numeric_limits<double>::infinity();
+    std::vector<CoupledBody> bodies{falling(1), falling(1)};
+    const BodySupport nail[] = {{up(), 0.0, 1e4, {-kInfinite, kInfinite}}};
+    bodies[0].supports = nail;
+    bodies[0].mass += 1e4 * up() * up().transpose();
+    bodies[0].freeTwist[1] = -1.0 / 10001;
+    RigidContact joint = onTop(1e4);
+    joint.range = {-kInfinite, kInfinite};
+    BodySupports supports;
+    supports.begin(bodies, {}, std::vector{joint}, {0, 1});
+    Eigen::Matrix<double, 6, Eigen::Dynamic> impulses(6, 2);
+    for (const double pull : {-5.0, 5.0}) {
+        impulses << Vec6::Zero(), pull * up();
+        const auto& twists = supports.respond(impulses, 0.1);
+        EXPECT_NEAR(twists(1, 1), (pull - 2.0) / 1e4, 2e-3);
+        EXPECT_NEAR(twists(1, 0), (pull - 2.0) / 1e4, 1e-5);
+    }
+}
+
+/// A motor that is to hold a body gives no more than it has, and the rest moves the body.
+TEST(BodySupports, AMotorGivesWhatItHas) {
+    constexpr double kStrength = 2.0;  // [N s]
+    std::vector<CoupledBody> bodies{falling(1)};
+    const BodySupport motor[] = {{up(), 0.0, 1e4, {-kStrength, kStrength}}};
+    bodies[0].supports = motor;
+    bodies[0].mass += 1e4 * up() * up().transpose();
+    bodies[0].freeTwist[1] = -1.0 / 10001;
+    BodySupports supports;
+    for (const double pull : {-5.0, 0.0, 2.0, 7.0}) {
+        supports.begin(bodies, {}, {}, {0});
+        const double beyond = std::copysign(std::max(0.0, std::abs(pull - 1.0) - kStrength), pull - 1.0);
+        EXPECT_NEAR(supports.respond(pull * up(), 0.1)(1, 0), beyond, 1e-3) << pull;
+    }
+}
+
+/// Two that a motor drives apart.
+TEST(BodySupports, AMotorBetweenBodiesPushesBothAsHardAsItCan) {
+    const std::vector<CoupledBody> bodies{falling(1), falling(4)};
+    RigidContact motor = onTop(1e4);
+    motor.velocity = 10.0;
+    motor.range = {-2.0, 2.0};
+    BodySupports supports;
+    supports.begin(bodies, {}, std::vector{motor}, {0, 1});
+    const auto& twists = supports.respond(Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, 2), 0.1);
+    EXPECT_NEAR(twists(1, 0), -1.0 - 2.0 / 1, 1e-9);
+    EXPECT_NEAR(twists(1, 1), -1.0 + 2.0 / 4, 1e-9);
 }
 
 TEST(BodySupports, ABodyThatStandsStillBearsTheOther) {

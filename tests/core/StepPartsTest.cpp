@@ -75,6 +75,22 @@ TEST(StepParts, ABodyThatHitsTheGroundStopsAtOnce) {
     EXPECT_NEAR(scene.bodies[0].motion[1], 0.0, 2e-4 * kWhole);
 }
 
+/// Over the whole step it gives what it may in the whole step.
+TEST(StepParts, AMotorGivesItsShare) {
+    OnGround scene(1.0);
+    scene.ground.range = {-3.0, 5.0};
+    const std::vector<RigidContact> motors{{.weight = 1.0, .range = {-1.0, 2.0}}};
+    scene.input.rigidContacts = motors;
+    ASSERT_TRUE(StepParts::areAllowed(scene.input));
+    StepParts step(scene.input, {});
+    const double share = step.next().h / kWhole;
+    ASSERT_LT(share, 1.0);
+    EXPECT_EQ(step.next().bodies[0].supports[0].range.least, -3.0 * share);
+    EXPECT_EQ(step.next().bodies[0].supports[0].range.most, 5.0 * share);
+    EXPECT_EQ(step.next().rigidContacts[0].range.least, -1.0 * share);
+    EXPECT_EQ(step.next().rigidContacts[0].range.most, 2.0 * share);
+}
+
 TEST(StepParts, WhatBodiesLeaveIsKnownForWholeStepsOnly) {
     EXPECT_TRUE(StepParts::areAllowed(OnGround(0.0).input));
     EXPECT_FALSE(StepParts::areAllowed(OnGround(1.0).input));

@@ -1,5 +1,7 @@
 #pragma once
 #include <array>
+#include <cmath>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -8,13 +10,25 @@
 /// Everything that the solver and the collision code say to each other.
 namespace jacket {
 
+/// What impulses something may give that holds a body in one direction [N s; N m s about an axis]: contacts and the
+/// limits of joints push only, joints pull too, motors do either as far as their force goes. Beyond that it gives way.
+struct ImpulseRange {
+    double least = 0.0;  ///< <= 0
+    double most = std::numeric_limits<double>::infinity();
+
+    bool pulls() const { return least < 0.0; }
+    /// In a part of the step.
+    ImpulseRange part(double share) const { return {share * least, share * most}; }
+};
+
 /// A rigid contact of a body with something else, which bore load when the step began, or is closed in it: it keeps
-/// row . twist from falling below `velocity`. Mass and free twist of its body are given as if it held either way, by a
-/// stiff term weight row row^T.
+/// row . twist from falling below `velocity`. Or a row of a joint, which keeps it there. Mass and free twist of its
+/// body are given as if it held either way, by a stiff term weight row row^T.
 struct BodySupport {
     Vec6 row = Vec6::Zero();  ///< velocity along the contact's normal, towards the body, from the body's twist
     double velocity = 0.0;    ///< of what is on the other side, and by which the two are to part at least [m/s]
-    double weight = 0.0;      ///< how heavy that is [kg], > 0
+    double weight = 0.0;      ///< how heavy that is [kg; kg m^2 about an axis], > 0
+    ImpulseRange range{};
 };
 
 /// A rigid body that takes part in the shells' solve. Twists are (velocity of the centre of mass, angular velocity).
@@ -57,19 +71,22 @@ struct BodyCoupling {
 };
 
 /// A rigid contact between two dynamic bodies of the island, which bore load when the step began, or is closed in it:
-/// it keeps rowA . w_a + rowB . w_b from falling below `velocity`, by a stiff term. Masses and free twists are given
-/// without it. A body of prescribed motion must stand still.
+/// it keeps rowA . w_a + rowB . w_b from falling below `velocity`, by a stiff term. Or a row of a joint, which keeps it
+/// there. Masses and free twists are given without it. A body of prescribed motion must stand still.
 struct RigidContact {
     int a = 0, b = 0;          ///< bodies, a != b
     Vec6 rowA = Vec6::Zero();  ///< how fast it opens, from the twist of a
     Vec6 rowB = Vec6::Zero();  ///< and from that of b
-    double weight = 0.0;       ///< of the stiff term [kg], > 0
+    double weight = 0.0;       ///< of the stiff term [kg; kg m^2 about an axis], > 0
     double velocity = 0.0;     ///< with which the two are to part at least [m/s]
+    ImpulseRange range{};
 
-    /// Whether the body of that row bears the other one there, rather than lies on it or is beside it.
-    static bool bears(const Vec6& row, const Vec3& gravity) {
+    /// Whether the body of that row bears the other one there, rather than lies on it or is beside it. What a joint
+    /// holds together bears each other.
+    bool bears(const Vec6& row, const Vec3& gravity) const {
         constexpr double kBeside = 0.1;  // cosine of the angle between the contact's normal and gravity
-        return row.head<3>().dot(gravity) > kBeside * gravity.norm();
+        const double along = row.head<3>().dot(gravity);
+        return (range.pulls() ? std::abs(along) : along) > kBeside * gravity.norm();
     }
 };
 

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 
 #include <algorithm>
+#include <cmath>
 
 namespace jacket {
 namespace {
@@ -11,9 +12,13 @@ constexpr double kPull = 1e-2;   // of a body's weight, or of what is pressed on
                                  // that pulls less may stay for the step
 constexpr int kMostReturns = 1;  // a contact that has let go twice stays away: it closes in the bodies' own step
 
-/// How fast a pair opens, beyond what it is to.
-double surplusOpening(const RigidContact& pair, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) {
-    return pair.rowA.dot(w.col(pair.a)) + pair.rowB.dot(w.col(pair.b)) - pair.velocity;
+/// Of what holds a body, or two together [N s].
+double impulseOf(const BodySupport& support, const Vec6& twist) {
+    return support.weight * (support.velocity - support.row.dot(twist));
+}
+
+double impulseOf(const RigidContact& pair, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) {
+    return pair.weight * (pair.velocity - pair.rowA.dot(w.col(pair.a)) - pair.rowB.dot(w.col(pair.b)));
 }
 
 }  // namespace
@@ -62,7 +67,7 @@ void BodySupports::addSupport(const RigidContact& pair) {
     const int body = std::max(pair.a, pair.b);
     if (body < 0) return;
     const Vec6& row = pair.a < 0 ? pair.rowB : pair.rowA;
-    m_supports.push_back({.body = body, .contact = {row, pair.velocity, pair.weight}});
+    m_supports.push_back({.body = body, .contact = {row, pair.velocity, pair.weight, pair.range}});
     m_mass[body] += pair.weight * row * row.transpose();
     m_momentum[body] += pair.weight * pair.velocity * row;
     m_freeTwist[body] = m_mass[body].ldlt().solve(m_momentum[body]);
@@ -70,13 +75,19 @@ void BodySupports::addSupport(const RigidContact& pair) {
 
 /// The term of the pair that m_couplings has at the same place, or takes it away.
 void BodySupports::add(const Pair& pair, double sign) {
-    const auto& [a, b, rowA, rowB, weight, velocity] = pair.contact;
+    const auto& [a, b, rowA, rowB, weight, velocity, range] = pair.contact;
     m_momentum[a] += sign * weight * velocity * rowA;
     m_momentum[b] += sign * weight * velocity * rowB;
     m_mass[a] += sign * weight * rowA * rowA.transpose();
     m_mass[b] += sign * weight * rowB * rowB.transpose();
     m_couplings[m_givenCouplings + static_cast<std::size_t>(&pair - m_pairs.data())].mass +=
         sign * weight * rowA * rowB.transpose();
+}
+
+/// Gives both bodies an impulse along the pair's rows.
+void BodySupports::push(const Pair& pair, double impulse) {
+    m_momentum[pair.contact.a] += impulse * pair.contact.rowA;
+    m_momentum[pair.contact.b] += impulse * pair.contact.rowB;
 }
 
 /// Of bodies that couplings join. Only where there are pairs; free twists that were given agree with the given
@@ -132,10 +143,17 @@ double BodySupports::kineticEnergy(const Eigen::Matrix<double, 6, Eigen::Dynamic
     return sum;
 }
 
-bool BodySupports::Hold::turn(double opening, double most) {
-    const bool turns = holds ? opening > most : opening < 0.0;
-    if (!turns || (!holds && returns == kMostReturns)) return false;
-    if (!holds) ++returns;
+/// `impulse`: what it gives if it holds.
+bool BodySupports::Hold::turn(const ImpulseRange& range, double impulse, double slack) {
+    const bool pullsTooMuch = impulse < range.least - slack;
+    if (holds) {
+        if (!pullsTooMuch && impulse <= range.most + slack) return false;
+        given = pullsTooMuch ? range.least : range.most;
+    } else {
+        const bool isBack = given == range.least ? impulse > given : impulse < given;
+        if (!isBack || returns == kMostReturns) return false;
+        ++returns;
+    }
     holds = !holds;
     return true;
 }
@@ -145,12 +163,14 @@ bool BodySupports::Hold::turn(double opening, double most) {
 void BodySupports::findLoads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) {
     std::vector<double>& most = m_loads;
     most.assign(m_mass.size(), 0.0);
+    const auto loadOf = [](const ImpulseRange& range, double impulse) {
+        return range.pulls() ? std::abs(impulse) : impulse;
+    };
     for (const auto& [body, contact, hold] : m_supports)
-        if (hold.holds)
-            most[body] = std::max(most[body], contact.weight * (contact.velocity - contact.row.dot(w.col(body))));
+        if (hold.holds) most[body] = std::max(most[body], loadOf(contact.range, impulseOf(contact, w.col(body))));
     for (const auto& [contact, hold] : m_pairs) {
         if (!hold.holds) continue;
-        const double load = -contact.weight * surplusOpening(contact, w);
+        const double load = loadOf(contact.range, impulseOf(contact, w));
         most[contact.a] = std::max(most[contact.a], load);
         most[contact.b] = std::max(most[contact.b], load);
     }
@@ -161,21 +181,23 @@ bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, dou
     findLoads(w);
     const std::vector<double>& load = m_loads;
     for (Support& support : m_supports) {
-        const auto& [row, velocity, weight] = support.contact;
-        const double opening = row.dot(w.col(support.body)) - velocity;
-        const double pull = kPull * std::max(lightest(support.body) * kick, load[support.body]);
-        if (!support.hold.turn(opening, pull / weight)) continue;
+        const auto& [row, velocity, weight, range] = support.contact;
+        const double impulse = impulseOf(support.contact, w.col(support.body));
+        const double slack = kPull * std::max(lightest(support.body) * kick, load[support.body]);
+        if (!support.hold.turn(range, impulse, slack)) continue;
         const double sign = support.hold.holds ? 1.0 : -1.0;
         m_mass[support.body] += sign * weight * row * row.transpose();
-        m_momentum[support.body] += sign * weight * velocity * row;
+        m_momentum[support.body] += sign * (weight * velocity - support.hold.given) * row;
         m_freeTwist[support.body] = m_mass[support.body].ldlt().solve(m_momentum[support.body]);
         changed = true;
     }
     for (Pair& pair : m_pairs) {
         const int a = pair.contact.a, b = pair.contact.b;
-        const double pull = kPull * std::max(std::min(lightest(a), lightest(b)) * kick, std::min(load[a], load[b]));
-        if (!pair.hold.turn(surplusOpening(pair.contact, w), pull / pair.contact.weight)) continue;
-        add(pair, pair.hold.holds ? 1.0 : -1.0);
+        const double slack = kPull * std::max(std::min(lightest(a), lightest(b)) * kick, std::min(load[a], load[b]));
+        if (!pair.hold.turn(pair.contact.range, impulseOf(pair.contact, w), slack)) continue;
+        const double sign = pair.hold.holds ? 1.0 : -1.0;
+        add(pair, sign);
+        push(pair, -sign * pair.hold.given);
         changed = true;
     }
     if (changed && !m_pairs.empty()) solveFreeTwists();

@@ -14,14 +14,16 @@ inline bool isUnderBody(const Contact& contact, const Vec3& gravity) {
     return contact.normal.dot(gravity) > kBelow * gravity.norm();
 }
 
-/// Masses and free twists of an island's dynamic bodies with those of their rigid contacts that hold. A shell may lift
-/// a body off what carries it: the contact then lets go, or the shell would have to move the ground with it.
+/// Masses and free twists of an island's dynamic bodies with those of their rigid contacts and joints that hold. A
+/// shell may lift a body off what carries it: the contact then lets go, or the shell would have to move the ground with
+/// it.
 class BodySupports {
   public:
-    /// All contacts hold. `dynamicIndex`: of each body among the dynamic ones, -1: prescribed.
+    /// All contacts and joints hold. `dynamicIndex`: of each body among the dynamic ones, -1: prescribed.
     void begin(std::span<const CoupledBody> bodies, std::span<const BodyCoupling> couplings,
                std::span<const RigidContact> contacts, const std::vector<int>& dynamicIndex);
-    /// Lets go of contacts that pull and takes hold of those that close, at the solved twists; true if any changed.
+    /// Lets go of what would have to give more than it can, as contacts that pull, and takes hold of contacts that
+    /// close, at the solved twists; true if any changed.
     /// `kick`: what gravity does in the step [m/s].
     bool update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, double kick);
     /// Twists that impulses of shells lead to where contacts push only. The contacts are then as that leaves them.
@@ -36,11 +38,13 @@ class BodySupports {
     const std::vector<BodyCoupling>& couplings() const { return m_couplings; }
 
   private:
-    /// Whether a contact holds, and how often it came back in this step.
+    /// Whether a contact holds, and how often it came back in this step. One that does not gives a constant impulse: a
+    /// bound of its range, which is none where it may only push.
     struct Hold {
         bool holds = true;
         int returns = 0;
-        bool turn(double opening, double most);
+        double given = 0.0;  ///< where it does not hold [N s]
+        bool turn(const ImpulseRange& range, double impulse, double slack);
     };
     struct Support {
         int body;  ///< among the dynamic ones
@@ -54,6 +58,7 @@ class BodySupports {
 
     void addSupport(const RigidContact& pair);
     void add(const Pair& pair, double sign);
+    void push(const Pair& pair, double impulse);
     void findLoads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w);
     void solveFreeTwists();
     void solveTwists(std::vector<Vec6>& momenta);
