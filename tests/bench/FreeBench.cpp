@@ -53,7 +53,9 @@ int main(int argc, char** argv) {
                                 ballAtCurtain("ball of 100 g at a curtain", 0.1),
                                 ballAtCurtain("ball of 1 kg at a curtain", 1.0),
                                 fallingTogether("box of 1 kg on a falling cloth", 1.0),
-                                clothOnFallingBox("cloth on a box of 1 kg that lands", 1.0)};
+                                clothOnFallingBox("cloth on a box of 1 kg that lands", 1.0),
+                                clothOnBridge("cloth on a bridge of 9 planks", 0.1),
+                                clothOnRagdoll("cloth on a figure that falls")};
     const std::string material = argc > 1 ? argv[1] : "cotton", only = argc > 2 ? argv[2] : "";
     const int starts = argc > 3 ? std::atoi(argv[3]) : 6;
     for (const int cells : {24, 48})

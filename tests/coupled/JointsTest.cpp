@@ -15,25 +15,13 @@ namespace {
 
 /// Boards of 30 x 4 x 30 cm, 1 m up, and what holds them.
 struct JointScene : BulletScene {
-    std::vector<std::unique_ptr<btTypedConstraint>> joints;
-
     /// With ten, as usual, Bullet leaves more of the error of joints that two bodies share.
     JointScene() { world.getSolverInfo().m_numIterations = 50; }
-    ~JointScene() {
-        for (const auto& joint : joints) world.removeConstraint(joint.get());
-    }
     btRigidBody& addBoard(double mass) {
         btRigidBody& board =
             addBox(btVector3(btScalar(0.15), btScalar(0.02), btScalar(0.15)), mass, btVector3(0, 1, 0));
         board.setActivationState(DISABLE_DEACTIVATION);
         return board;
-    }
-    template <class Joint>
-    Joint& add(std::unique_ptr<Joint> joint) {
-        Joint& added = *joint;
-        joints.push_back(std::move(joint));
-        world.addConstraint(&added, true);
-        return added;
     }
     ShellBody& addCloth(double height) {
         ShellBody& cloth = shells->add(squareSheet(0.6, 12), materials::cotton(), {.friction = 0.5});
@@ -60,16 +48,18 @@ const Kind kKinds[] = {
      [](JointScene& scene, btRigidBody& board) {
          for (const double x : {-0.15, 0.15})
              for (const double z : {-0.15, 0.15})
-                 scene.add(std::make_unique<btPoint2PointConstraint>(board, btVector3(btScalar(x), 0, btScalar(z))));
+                 scene.addJoint(
+                     std::make_unique<btPoint2PointConstraint>(board, btVector3(btScalar(x), 0, btScalar(z))));
      }},
     {"six degrees of freedom, all locked", 5e-4,
      [](JointScene& scene, btRigidBody& board) {
-         auto& joint = scene.add(std::make_unique<btGeneric6DofSpring2Constraint>(board, frameAt(btVector3(0, 1, 0))));
+         auto& joint =
+             scene.addJoint(std::make_unique<btGeneric6DofSpring2Constraint>(board, frameAt(btVector3(0, 1, 0))));
          for (int axis = 0; axis < 6; ++axis) joint.setLimit(axis, 0, 0);
      }},
     {"slider with a strong motor", 5e-4,
      [](JointScene& scene, btRigidBody& board) {
-         auto& joint = scene.add(std::make_unique<btSliderConstraint>(board, frameAt(btVector3(0, 0, 0)), true));
+         auto& joint = scene.addJoint(std::make_unique<btSliderConstraint>(board, frameAt(btVector3(0, 0, 0)), true));
          joint.setLowerLinLimit(1);
          joint.setUpperLinLimit(-1);
          joint.setLowerAngLimit(0);
@@ -80,7 +70,8 @@ const Kind kKinds[] = {
      }},
     {"seesaw", 5e-4,
      [](JointScene& scene, btRigidBody& board) {
-         scene.add(std::make_unique<btHingeConstraint>(board, btVector3(btScalar(-0.03), 0, 0), btVector3(0, 0, 1)));
+         scene.addJoint(
+             std::make_unique<btHingeConstraint>(board, btVector3(btScalar(-0.03), 0, 0), btVector3(0, 0, 1)));
      }},
     {"arm of a heavy wheel", 3e-3,
      [](JointScene& scene, btRigidBody& board) {
@@ -88,9 +79,9 @@ const Kind kKinds[] = {
              scene.addBody(std::make_unique<btCylinderShapeZ>(btVector3(btScalar(0.3), btScalar(0.3), btScalar(0.05))),
                            5.0, btVector3(btScalar(-0.5), 1, 0));
          wheel.setActivationState(DISABLE_DEACTIVATION);
-         scene.add(std::make_unique<btHingeConstraint>(wheel, btVector3(0, 0, 0), btVector3(0, 0, 1)));
-         scene.add(std::make_unique<btFixedConstraint>(board, wheel, frameAt(btVector3(btScalar(-0.25), 0, 0)),
-                                                       frameAt(btVector3(btScalar(0.25), 0, 0))));
+         scene.addJoint(std::make_unique<btHingeConstraint>(wheel, btVector3(0, 0, 0), btVector3(0, 0, 1)));
+         scene.addJoint(std::make_unique<btFixedConstraint>(board, wheel, frameAt(btVector3(btScalar(-0.25), 0, 0)),
+                                                            frameAt(btVector3(btScalar(0.25), 0, 0))));
      }},
 };
 
@@ -122,7 +113,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, JointedBoard,
 TEST(Joints, BearWhatLiesOnABody) {
     JointScene scene;
     btRigidBody& board = scene.addBoard(0.2);
-    auto& nail = scene.add(std::make_unique<btGeneric6DofSpring2Constraint>(board, frameAt(btVector3(0, 1, 0))));
+    auto& nail = scene.addJoint(std::make_unique<btGeneric6DofSpring2Constraint>(board, frameAt(btVector3(0, 1, 0))));
     for (int axis = 0; axis < 6; ++axis) nail.setLimit(axis, 0, 0);
     btJointFeedback feedback;
     nail.setJointFeedback(&feedback);
@@ -145,7 +136,7 @@ TEST(Joints, BearWhatLiesOnABody) {
 double swing(bool hasCloth) {
     JointScene scene;
     btRigidBody& board = scene.addBoard(0.5);
-    scene.add(std::make_unique<btPoint2PointConstraint>(board, btVector3(0, btScalar(0.6), 0)));
+    scene.addJoint(std::make_unique<btPoint2PointConstraint>(board, btVector3(0, btScalar(0.6), 0)));
     if (hasCloth) {
         ShellBody& cloth = scene.shells->add(squareSheet(0.2, 6), trampolineCloth());
         place(cloth, {0, 0.97, 0});
@@ -166,6 +157,19 @@ TEST(Joints, LetABodySwing) {
     const double alone = swing(false);
     EXPECT_GT(alone, 0.08);
     EXPECT_NEAR(swing(true), alone, 0.05 * alone);
+}
+
+/// The scene's own joints go with a body that is removed.
+TEST(Joints, GoWithTheirBodies) {
+    JointScene scene;
+    btRigidBody& board = scene.addBoard(0.5);
+    scene.addJoint(std::make_unique<btPoint2PointConstraint>(board, btVector3(0, 0, 0)));
+    scene.addCloth(1.05);
+    scene.run(0.1, kStep);
+    scene.remove(board);
+    EXPECT_EQ(scene.world.getNumConstraints(), 0);
+    scene.run(0.1, kStep);
+    EXPECT_TRUE(scene.shells->lastStep().finite);
 }
 
 }  // namespace

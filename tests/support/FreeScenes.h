@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -151,6 +152,58 @@ inline FreeScene clothOnFallingBox(const char* name, double mass) {
                                                btVector3(0, btScalar(drop + half), 0)));
                 return addSheet(scene, material, cells, Vec3(0.0, drop + 2.0 * half + 1e-4, 0.01) + aside);
             }};
+}
+
+/// Planks that hang on each other and, at both ends, on the world.
+inline FreeScene clothOnBridge(const char* name, double mass) {
+    return {
+        name, 2.0, 6.0, [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
+            constexpr int kPlanks = 9;
+            constexpr double kPitch = 0.1, kHalf = 0.05, kAside = 0.12;
+            for (int i = 0; i < kPlanks; ++i)
+                bodies.push_back(&scene.addBox(btVector3(btScalar(0.045), btScalar(0.01), btScalar(0.15)), mass,
+                                               btVector3(btScalar(kPitch * (i - kPlanks / 2)), btScalar(0.8), 0)));
+            for (const double z : {-kAside, kAside}) {
+                const btVector3 left(btScalar(-kHalf), 0, btScalar(z)), right(btScalar(kHalf), 0, btScalar(z));
+                scene.addJoint(std::make_unique<btPoint2PointConstraint>(*bodies.front(), left));
+                scene.addJoint(std::make_unique<btPoint2PointConstraint>(*bodies.back(), right));
+                for (int i = 1; i < kPlanks; ++i)
+                    scene.addJoint(std::make_unique<btPoint2PointConstraint>(*bodies[i - 1], *bodies[i], right, left));
+            }
+            return addSheet(scene, material, cells, Vec3(0.05, 0.9, 0.03) + aside);
+        }};
+}
+
+/// Holds two bodies together at a point of the world.
+inline void joinAt(BulletScene& scene, btRigidBody& a, btRigidBody& b, const btVector3& at) {
+    scene.addJoint(std::make_unique<btPoint2PointConstraint>(a, b, a.getWorldTransform().inverse() * at,
+                                                             b.getWorldTransform().inverse() * at));
+}
+
+/// A figure that falls on its back, and a cloth on it.
+inline FreeScene clothOnRagdoll(const char* name) {
+    return {
+        name, 3.0, 6.0, [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
+            constexpr double y = 0.5;
+            const auto at = [](double x, double z) { return btVector3(btScalar(x), btScalar(y), btScalar(z)); };
+            const auto limb = [&](auto shape, btRigidBody& on, const btVector3& joint, const btVector3& middle) {
+                bodies.push_back(&scene.addBody(std::move(shape), 2.0, middle));
+                joinAt(scene, on, *bodies.back(), joint);
+                return bodies.back();
+            };
+            bodies.push_back(&scene.addBox(btVector3(btScalar(0.14), btScalar(0.08), btScalar(0.22)), 20.0, at(0, 0)));
+            btRigidBody& torso = *bodies.back();
+            limb(std::make_unique<btSphereShape>(btScalar(0.1)), torso, at(0, 0.25), at(0, 0.36));
+            for (const double side : {-1.0, 1.0}) {
+                const auto arm = [] { return std::make_unique<btCapsuleShapeX>(btScalar(0.05), btScalar(0.15)); };
+                const auto leg = [] { return std::make_unique<btCapsuleShapeZ>(btScalar(0.06), btScalar(0.2)); };
+                btRigidBody* upper = limb(arm(), torso, at(0.16 * side, 0.18), at(0.29 * side, 0.18));
+                limb(arm(), *upper, at(0.42 * side, 0.18), at(0.55 * side, 0.18));
+                upper = limb(leg(), torso, at(0.08 * side, -0.24), at(0.08 * side, -0.41));
+                limb(leg(), *upper, at(0.08 * side, -0.58), at(0.08 * side, -0.75));
+            }
+            return addSheet(scene, material, cells, Vec3(0.05, y + 0.2, 0.03) + aside);
+        }};
 }
 
 }  // namespace free_scenes

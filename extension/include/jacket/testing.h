@@ -42,6 +42,7 @@ struct Scene : WorldParts<World> {
     using WorldParts<World>::world;
     std::vector<std::unique_ptr<btCollisionShape>> shapes;
     std::vector<std::unique_ptr<btRigidBody>> bodies;
+    std::vector<std::unique_ptr<btTypedConstraint>> joints;
     std::unique_ptr<bullet::ShellWorld> shells = std::make_unique<bullet::ShellWorld>(world);
 
     /// `gravity`: along y [m/s^2].
@@ -50,6 +51,7 @@ struct Scene : WorldParts<World> {
     Scene& operator=(const Scene&) = delete;
     ~Scene() {
         shells.reset();
+        for (const auto& joint : joints) world.removeConstraint(joint.get());
         for (const auto& body : bodies) world.removeRigidBody(body.get());
     }
 
@@ -76,7 +78,22 @@ struct Scene : WorldParts<World> {
         return addBody(std::make_unique<btStaticPlaneShape>(btVector3(0, 1, 0), btScalar(height)), 0.0,
                        btVector3(0, 0, 0));
     }
+    /// Bodies that a joint holds together do not touch each other.
+    template <class Joint>
+    Joint& addJoint(std::unique_ptr<Joint> joint) {
+        Joint& added = *joint;
+        joints.push_back(std::move(joint));
+        world.addConstraint(&added, true);
+        return added;
+    }
+    /// With its joints.
     void remove(btRigidBody& body) {
+        const auto holdsIt = [&](const auto& joint) {
+            if (&joint->getRigidBodyA() != &body && &joint->getRigidBodyB() != &body) return false;
+            world.removeConstraint(joint.get());
+            return true;
+        };
+        std::erase_if(joints, holdsIt);
         world.removeRigidBody(&body);
         std::erase_if(bodies, [&](const auto& b) { return b.get() == &body; });
     }
