@@ -12,7 +12,7 @@ Vec6 twistOf(const btRigidBody& body) {
 
 Vec6 freeTwistOf(const btRigidBody& body, double h) {
     Vec6 twist = twistOf(body);
-    if (!body.isActive()) return twist;
+    if (!body.isActive() || body.isStaticOrKinematicObject()) return twist;
     twist.head<3>() += h * double(body.getInvMass()) * fromBullet(body.getTotalForce());
     twist.tail<3>() += h * (fromBullet(body.getInvInertiaTensorWorld()) * fromBullet(body.getTotalTorque()));
     return twist;
@@ -21,7 +21,7 @@ Vec6 freeTwistOf(const btRigidBody& body, double h) {
 Vec3 pointVelocity(const btCollisionObject& object, const Vec3& at, double h) {
     const btRigidBody* body = btRigidBody::upcast(&object);
     if (!body) return Vec3::Zero();
-    const Vec6 twist = body->isStaticOrKinematicObject() ? twistOf(*body) : freeTwistOf(*body, h);
+    const Vec6 twist = freeTwistOf(*body, h);
     return twist.head<3>() + twist.tail<3>().cross(at - fromBullet(body->getCenterOfMassPosition()));
 }
 

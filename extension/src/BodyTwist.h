@@ -6,7 +6,7 @@
 namespace jacket::bullet {
 
 /// Linear and angular velocity of a body, now and after the coming step if nothing touches it: forces as they stand,
-/// gravity included.
+/// gravity included, but for what its user moves.
 Vec6 twistOf(const btRigidBody& body);
 Vec6 freeTwistOf(const btRigidBody& body, double h);
 

@@ -163,13 +163,8 @@ void RigidContacts::readJoints(const btCollisionObject& body) {
         if (!m_hasMoved) continue;
         for (std::size_t i = known; i < m_joints.size(); ++i)  // it has done what it does
             m_joints[i].velocity =
-                m_joints[i].alongFirst.dot(twistAhead(first)) + m_joints[i].alongSecond.dot(twistAhead(second));
+                m_joints[i].alongFirst.dot(twistOf(first)) + m_joints[i].alongSecond.dot(twistOf(second));
     }
-}
-
-/// At the end of the step if nothing touches the body.
-Vec6 RigidContacts::twistAhead(const btRigidBody& body) const {
-    return m_hasMoved || body.isStaticOrKinematicObject() ? twistOf(body) : freeTwistOf(body, m_h);
 }
 
 std::span<btPersistentManifold* const> RigidContacts::manifoldsOf(const btCollisionObject& object) const {
@@ -266,7 +261,7 @@ void RigidContacts::addJoints(const btRigidBody& body, std::vector<BodySupport>&
         if ((!first && row.second != &body) || areJoined(body, other)) continue;
         const Vec6 &own = first ? row.alongFirst : row.alongSecond, &others = first ? row.alongSecond : row.alongFirst;
         const double give = std::max(mobilityAlong(other, others), mobilityAlong(body, own) / kSupport);
-        const double velocity = row.velocity - others.dot(twistAhead(other));
+        const double velocity = row.velocity - others.dot(freeTwistOf(other, ahead()));
         supports.push_back({own, velocity, 1.0 / (give + row.ease), row.range});
     }
 }

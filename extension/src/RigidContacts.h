@@ -51,7 +51,6 @@ class RigidContacts {
     void indexJoints();
     void foresee(const btCollisionObject& body);
     void readJoints(const btCollisionObject& body);
-    Vec6 twistAhead(const btRigidBody& body) const;
     bool areJoined(const btCollisionObject& a, const btCollisionObject& b) const;
     void addLoaded(const btRigidBody& body, const Vec3& centre, std::vector<BodySupport>& supports) const;
     void addImpacts(const btRigidBody& body, const Vec3& centre, std::vector<BodySupport>& supports) const;
