@@ -195,6 +195,18 @@ std::pmr::vector<btCollisionObject*> Sleepers::supportsOf(const ShellBody& shell
     return supports;
 }
 
+/// They and all that is in an island with them: of one that has a body awake, Bullet wakes the others.
+std::pmr::vector<btCollisionObject*> Sleepers::companyOf(const std::pmr::vector<btCollisionObject*>& supports) const {
+    std::pmr::vector<btCollisionObject*> company(supports, &m_memory);
+    const auto& objects = m_world.getCollisionObjectArray();
+    for (int i = 0; i < objects.size(); ++i) {
+        const auto isWith = [tag = objects[i]->getIslandTag()](const auto* o) { return o->getIslandTag() == tag; };
+        if (objects[i]->getIslandTag() >= 0 && std::any_of(supports.begin(), supports.end(), isWith))
+            company.push_back(objects[i]);
+    }
+    return company;
+}
+
 void Sleepers::rest(const Vec3& gravity, double h) {
     if (gDisableDeactivation) return;
     std::pmr::vector<Candidate> candidates(&m_memory);
@@ -202,10 +214,13 @@ void Sleepers::rest(const Vec3& gravity, double h) {
         ShellRest& rest = *shell->m_rest;
         if (std::exchange(rest.wakeAsked, false)) rest.place.resize(3, 0), rest.level = 0.0;
         if (rest.asleep) continue;
-        candidates.push_back({shell.get(), supportsOf(*shell), keepsPlace(*shell, h)});
+        candidates.push_back(
+            {shell.get(), supportsOf(*shell), keepsPlace(*shell, h), std::pmr::vector<btCollisionObject*>(&m_memory)});
         followEnergy(candidates.back(), gravity, h);
         for (btCollisionObject* object : candidates.back().supports) keepAwake(*object, candidates.back().ready);
     }
+    for (Candidate& c : candidates)
+        if (c.ready) c.company = companyOf(c.supports);
     dropRestless(candidates);
     for (const Candidate& c : candidates) {
         if (!c.ready) continue;
@@ -213,11 +228,10 @@ void Sleepers::rest(const Vec3& gravity, double h) {
         c.shell->fallAsleep();
         rest.asleep = true;
         rest.revision = c.shell->shell().revision();
-        for (btCollisionObject* object : c.supports) {
-            jacket::bullet::fallAsleep(*object);
+        for (btCollisionObject* object : c.company) jacket::bullet::fallAsleep(*object);
+        for (btCollisionObject* object : c.supports)
             rest.supports.push_back({object, object->getBroadphaseHandle()->getUid(), object->getWorldTransform(),
                                      object->getWorldArrayIndex()});
-        }
     }
 }
 
@@ -270,7 +284,8 @@ bool Sleepers::isCalm(const Island& island, const Vec3& gravity) {
     return true;
 }
 
-/// A shell stays awake with any body that it touches, and that with any shell that it touches.
+/// A shell stays awake with any body that it touches or that is in an island with one, and that with any shell that it
+/// touches.
 void Sleepers::dropRestless(std::span<Candidate> candidates) const {
     for (bool changed = true; changed;) {
         changed = false;
@@ -278,7 +293,7 @@ void Sleepers::dropRestless(std::span<Candidate> candidates) const {
         for (const Candidate& c : candidates)
             if (!c.ready) awake.insert(awake.end(), c.supports.begin(), c.supports.end());
         for (Candidate& c : candidates) {
-            const bool restless = std::any_of(c.supports.begin(), c.supports.end(), [&](const btCollisionObject* o) {
+            const bool restless = std::any_of(c.company.begin(), c.company.end(), [&](const btCollisionObject* o) {
                 return !mayFallAsleep(*o) || (!sleeps(*o) && std::find(awake.begin(), awake.end(), o) != awake.end());
             });
             if (!c.ready || !restless) continue;

@@ -58,6 +58,7 @@ class Sleepers {
         ShellBody* shell;
         std::pmr::vector<btCollisionObject*> supports;
         bool ready;
+        std::pmr::vector<btCollisionObject*> company;  ///< what sleeps with it, if it is ready
     };
     bool keepsPlace(ShellBody& shell, double h) const;
     void followEnergy(const Candidate& candidate, const Vec3& gravity, double h) const;
@@ -67,6 +68,7 @@ class Sleepers {
     void wakeTouched(double h);
     bool touches(const ShellBody& shell, btCollisionObject& object, double h);
     std::pmr::vector<btCollisionObject*> supportsOf(const ShellBody& shell) const;
+    std::pmr::vector<btCollisionObject*> companyOf(const std::pmr::vector<btCollisionObject*>& supports) const;
     bool contains(const ShellRest::Support& support) const;
     btCollisionWorld& m_world;
     Obstacles& m_obstacles;

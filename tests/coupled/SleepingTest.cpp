@@ -185,6 +185,28 @@ TEST(Sleeping, AClothSleepsWithThePileThatItHangsOver) {
     EXPECT_GE(asleep, 2);
 }
 
+/// Bullet wakes all of an island of which one body is awake: the lower box, which the cloth does not touch.
+TEST(Sleeping, AClothFallsAsleepOnceAllOfThePileUnderItMay) {
+    Scene scene;
+    scene.addFloor();
+    const btScalar half = btScalar(0.1);
+    auto& lower = scene.addBox(btVector3(half, half, half), 2.0, btVector3(0, half, 0));
+    auto& upper = scene.addBox(btVector3(half, half, half), 2.0, btVector3(0, 3 * half, 0));
+    auto& cloth = scene.shells->add(sheetAt(0.15, 4, 0.4 + 5e-4), materials::cotton());
+    for (double t = 0.0; t < 6.0; t += kStep) {
+        lower.setDeactivationTime(0);
+        scene.step(kStep);
+        ASSERT_FALSE(cloth.isAsleep()) << t << " s";
+    }
+    ASSERT_GT(timeToSleep(scene, cloth, 6.0), 0.0);
+    for (double t = 0.0; t < 1.0; t += kStep) {
+        EXPECT_EQ(lower.getActivationState(), ISLAND_SLEEPING);
+        EXPECT_EQ(upper.getActivationState(), ISLAND_SLEEPING);
+        EXPECT_TRUE(cloth.isAsleep());
+        scene.step(kStep);
+    }
+}
+
 /// What happens to a sleeping pile, and that this wakes the cloth.
 struct Alarm {
     const char* name;
