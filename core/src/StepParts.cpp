@@ -9,8 +9,6 @@
 namespace jacket {
 namespace {
 
-constexpr double kSteady = 0.01;  // of what gravity does in a step: contacts that open no faster stay closed
-
 Mat3 turnOf(const Vec6& motion) {
     const Vec3 rotation = motion.tail<3>();
     return Eigen::AngleAxisd(rotation.norm(), rotation.normalized()).toRotationMatrix();
@@ -34,25 +32,8 @@ Vec6 freeTwistOf(const CoupledBody& given, const Vec6& startTwist, double share)
 
 bool StepParts::areAllowed(const IslandInput& whole) {
     const auto isPrescribed = [](const CoupledBody& body) { return body.prescribed; };
-    if (!whole.contacts || whole.inOnePiece) return false;
-    if (std::all_of(whole.bodies.begin(), whole.bodies.end(), isPrescribed)) return true;
-    const double most = kSteady * whole.h * whole.gravity.norm();
-    const auto staysClosed = [most](double opening) { return opening <= most; };
-    const auto isBorneEvenly = [&](const CoupledBody& body) {
-        return body.prescribed ||
-               std::all_of(body.supports.begin(), body.supports.end(), [&](const BodySupport& support) {
-                   return support.range.pulls() || (staysClosed(support.row.dot(body.startTwist) - support.velocity) &&
-                                                    staysClosed(support.row.dot(body.freeTwist) - support.velocity));
-               });
-    };
-    const auto keepsClosed = [&](const RigidContact& pair) {
-        const CoupledBody &a = whole.bodies[pair.a], &b = whole.bodies[pair.b];
-        return pair.range.pulls() ||
-               (staysClosed(pair.rowA.dot(a.startTwist) + pair.rowB.dot(b.startTwist) - pair.velocity) &&
-                staysClosed(pair.rowA.dot(a.freeTwist) + pair.rowB.dot(b.freeTwist) - pair.velocity));
-    };
-    return whole.couplings.empty() && std::all_of(whole.bodies.begin(), whole.bodies.end(), isBorneEvenly) &&
-           std::all_of(whole.rigidContacts.begin(), whole.rigidContacts.end(), keepsClosed);
+    return whole.contacts && !whole.inOnePiece &&
+           (whole.couplings.empty() || std::all_of(whole.bodies.begin(), whole.bodies.end(), isPrescribed));
 }
 
 StepParts::StepParts(const IslandInput& whole, const StepReport& failed)

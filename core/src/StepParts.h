@@ -16,8 +16,7 @@ class StepParts {
     /// `failed`: what the attempt at the whole step cost. `whole` must outlive this.
     StepParts(const IslandInput& whole, const StepReport& failed);
     ~StepParts();
-    /// Whether a step may be taken in parts: what joins free bodies is known for whole steps only, and so is what they
-    /// come to lie on.
+    /// Whether a step may be taken in parts: the couplings of free bodies are known for whole steps only.
     static bool areAllowed(const IslandInput& whole);
 
     const IslandInput& next() const { return m_part; }

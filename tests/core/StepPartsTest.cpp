@@ -91,12 +91,28 @@ TEST(StepParts, AMotorGivesItsShare) {
     EXPECT_EQ(step.next().rigidContacts[0].range.most, 2.0 * share);
 }
 
-TEST(StepParts, WhatBodiesLeaveIsKnownForWholeStepsOnly) {
-    EXPECT_TRUE(StepParts::areAllowed(OnGround(0.0).input));
-    EXPECT_FALSE(StepParts::areAllowed(OnGround(1.0).input));
+/// The stiff term lets go of it, and has no momentum of its own in any part.
+TEST(StepParts, ABodyThatLeavesTheGroundFliesAsByItself) {
+    OnGround scene(1.0);
+    ASSERT_TRUE(StepParts::areAllowed(scene.input));
+    StepParts step(scene.input, {});
+    double speed = 1.0;
+    while (!step.areDone()) {
+        BodySupports supports;
+        supports.begin(step.next().bodies, {}, {}, {0});
+        supports.respond(Vec6::Zero(), 9.81 * step.next().h);
+        EXPECT_NEAR(supports.freeTwists()[0][1], speed - 9.81 * step.next().h, 1e-6);
+        speed = supports.freeTwists()[0][1];
+        OnGround::pass(step, speed);
+    }
+    EXPECT_NEAR(speed, 1.0 - 9.81 * kWhole, 1e-6);
+}
+
+TEST(StepParts, CouplingsAreKnownForWholeStepsOnly) {
     OnGround joined(0.0);
     joined.bodies.push_back(joined.bodies[0]);
     joined.input.bodies = joined.bodies;
+    EXPECT_TRUE(StepParts::areAllowed(joined.input));
     const std::vector<BodyCoupling> joints{{0, 1, 0.1 * Mat6::Identity()}};
     joined.input.couplings = joints;
     EXPECT_FALSE(StepParts::areAllowed(joined.input));
