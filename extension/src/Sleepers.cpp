@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kAtRest = 0.01;     // of the mean edge: a vertex that moves no farther keeps its place
 constexpr double kSlowShell = 0.03;  // of sqrt(g L), L: the shell's side: no faster on average is what only flickers
-constexpr double kFall = 2e-4;       // of m g L: what loses less keeps its energy
+constexpr double kFall = 2e-4;       // of m g L: what loses less in waitForCalm() only creeps along with what it is on
 constexpr double kMostWait = 0.9;    // of gDeactivationTime: as far as a body that touches an awake shell gets
 constexpr double kSlow = 0.01;       // a body slower than this stands, and wakes no shell that it comes near [m/s]
 
@@ -267,7 +267,7 @@ void Sleepers::followEnergy(const Candidate& candidate, const Vec3& gravity, dou
     const double energy =
         kinetic + shell.elasticEnergy(shell.positions()) - gravity.dot(shell.positions() * shell.masses());
     const bool hasFallen = waited == 0.0 || energy < rest.lowest - kFall * weightTimesSide;
-    if (hasFallen) rest.lowest = energy;
+    rest.lowest = hasFallen ? energy : rest.lowest - h / waitForCalm() * kFall * weightTimesSide;
     rest.level = (hasFallen ? 0.0 : waited) + h;
 }
 

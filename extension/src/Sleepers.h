@@ -18,8 +18,8 @@ struct ShellRest {
     bool wakeAsked = false;       ///< by the user, since the last step
     double quiet = 0.0;           ///< for how long no vertex has left its place [s]
     Points place;                 ///< where the vertices were when it began [m]
-    double lowest = 0.0;          ///< energy since it has been slow, that of its height too [J]
-    double level = 0.0;           ///< for how long that has not fallen [s]
+    double lowest = 0.0;          ///< energy since it has been slow, of its height too, but for what creeping takes [J]
+    double level = 0.0;           ///< for how long it has not been less than that [s]
     double damped = 0.0;          ///< for how long it has been, see Sleepers::isCalm [s]
     unsigned revision = 0;        ///< of the shell in the last step that it was awake in
     Vec3 gravity = Vec3::Zero();  ///< the world's then [m/s^2]

@@ -164,17 +164,16 @@ TEST(Sleeping, AClothSleepsWithTheCrateThatItHangsOver) {
     }
 }
 
-/// What lies on another body has no support of its own. (Lighter boxes topple under the cloth.)
+/// What lies on another body has no support of its own. Stacked boxes creep by up to 1 mm/s in Bullet, and the cloth
+/// with them. (Lighter boxes topple under the cloth.)
 TEST(Sleeping, AClothSleepsWithThePileThatItHangsOver) {
-    int asleep = 0;
-    for (int start = 0; start < 3; ++start) {
+    for (const int start : {9, 18, 72}) {
         Scene scene;
         scene.addFloor();
         std::vector<btRigidBody*> boxes;
         auto& cloth = free_scenes::pileUnderCloth("boxes", 2.0)
                           .make(scene, materials::cotton(), 16, Vec3(0.007 * start, 0, 0.005 * start), boxes);
-        asleep += timeToSleep(scene, cloth, 25.0) > 0.0 ? 1 : 0;
-        if (!cloth.isAsleep()) continue;
+        EXPECT_GT(timeToSleep(scene, cloth, 25.0), 0.0) << start;
         scene.run(1.0, kStep);
         EXPECT_TRUE(cloth.isAsleep());
         boxes.back()->activate();
@@ -182,7 +181,6 @@ TEST(Sleeping, AClothSleepsWithThePileThatItHangsOver) {
         scene.run(0.1, kStep);
         EXPECT_FALSE(cloth.isAsleep());
     }
-    EXPECT_GE(asleep, 2);
 }
 
 /// Bullet wakes all of an island of which one body is awake: the lower box, which the cloth does not touch.
