@@ -1,6 +1,6 @@
 #include "BodyTwist.h"
 
-#include "Convert.h"
+#include <Eigen/Geometry>
 
 namespace jacket::bullet {
 
@@ -15,6 +15,13 @@ Vec6 freeTwistOf(const btRigidBody& body, double h) {
     if (!body.isActive() || body.isStaticOrKinematicObject()) return twist;
     twist.head<3>() += h * double(body.getInvMass()) * fromBullet(body.getTotalForce());
     twist.tail<3>() += h * (fromBullet(body.getInvInertiaTensorWorld()) * fromBullet(body.getTotalTorque()));
+    return twist;
+}
+
+Vec6 twistBetween(const Frame& before, const Frame& now, double time) {
+    const Eigen::AngleAxisd turn(Eigen::Quaterniond(now.linear() * before.linear().transpose()).normalized());
+    Vec6 twist;
+    twist << (now.translation() - before.translation()) / time, turn.angle() / time * turn.axis();
     return twist;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
+#include "Convert.h"
 #include "jacket/Types.h"
 
 namespace jacket::bullet {
@@ -9,6 +10,9 @@ namespace jacket::bullet {
 /// gravity included, but for what its user moves.
 Vec6 twistOf(const btRigidBody& body);
 Vec6 freeTwistOf(const btRigidBody& body, double h);
+
+/// Of the motion from one pose to another in a time.
+Vec6 twistBetween(const Frame& before, const Frame& now, double time);
 
 /// Velocity that a point of an object, which is at `at` in the world now, will have after a step of length h if nothing
 /// touches the object; 0: the velocity that it has.

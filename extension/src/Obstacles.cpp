@@ -49,14 +49,6 @@ double radiusOf(const btCollisionShape& shape) {
     return std::min(double(radius + centre.length()), 1e6);
 }
 
-/// Of the motion from one pose to another in a time.
-Vec6 twistBetween(const Frame& before, const Frame& now, double time) {
-    const Eigen::AngleAxisd turn(Eigen::Quaterniond(now.linear() * before.linear().transpose()).normalized());
-    Vec6 twist;
-    twist << (now.translation() - before.translation()) / time, turn.angle() / time * turn.axis();
-    return twist;
-}
-
 /// Whether two twists lead a body nearly the same way in a time.
 bool isNearly(const Vec6& a, const Vec6& b, double time) {
     constexpr double kShare = 1e-3, kTurn = 1e-3;  // of the way, [rad]
@@ -111,7 +103,7 @@ Obstacle Obstacles::make(btCollisionObject& object, double h, const RigidContact
     } else {
         const bool moves = rigid->isActive() && rigid->getInvMass() != btScalar(0);
         coupled.prescribed = !moves;
-        coupled.startTwist = twistOf(*rigid);
+        coupled.startTwist = hasMoved ? madeTwist(*rigid, h) : twistOf(*rigid);
         coupled.freeTwist = moves && !hasMoved ? freeTwistOf(*rigid, h) : coupled.startTwist;
         if (hasMoved) obstacle.start = moved(obstacle.start, coupled.freeTwist, -h);
         coupled.position = obstacle.start.translation();
@@ -133,6 +125,13 @@ Frame Obstacles::startOf(const btCollisionObject& object, double h) {
     const btRigidBody* rigid = btRigidBody::upcast(&object);
     const bool isFree = rigid && !object.isStaticOrKinematicObject();
     return moved(now, isFree ? twistOf(*rigid) : prescribedTwist(object, h), -h);
+}
+
+/// Of the motion that a free body has made in the last step. If it was not noted where that began, its velocity.
+Vec6 Obstacles::madeTwist(const btRigidBody& body, double h) const {
+    const auto start = m_starts.find(&body);
+    return start == m_starts.end() ? twistOf(body)
+                                   : twistBetween(start->second, fromBullet(body.getWorldTransform()), h);
 }
 
 std::vector<BodySupport>& Obstacles::freeSupports() {

@@ -57,7 +57,10 @@ class Obstacles {
     void beginStep() {
         ++m_step;
         m_supportCount = 0;
+        m_starts.clear();
     }
+    /// Where the motion began that a free body has made by this step.
+    void noteStart(const btCollisionObject& object, const Frame& start) { m_starts.emplace(&object, start); }
     /// False for bodies that no solve could take, see defectOf; warns once of each.
     bool isUsable(const btCollisionObject& object);
     /// Whether the world adds gravity to velocities itself instead of leaving it in the bodies' total force.
@@ -65,6 +68,7 @@ class Obstacles {
 
   private:
     std::vector<BodySupport>& freeSupports();
+    Vec6 madeTwist(const btRigidBody& body, double h) const;
     const ShapePieces& piecesOf(const btCollisionShape& shape);
     std::unordered_map<const btCollisionShape*, ShapePieces> m_shapes;
     std::vector<std::string> m_warnings;
@@ -77,6 +81,7 @@ class Obstacles {
     };
     Vec6 prescribedTwist(const btCollisionObject& object, double h);
     std::unordered_map<const btCollisionObject*, Pose> m_poses;  ///< of static and kinematic objects
+    std::unordered_map<const btCollisionObject*, Frame> m_starts;
     std::vector<std::vector<BodySupport>> m_supports;  ///< of the step's bodies; those beyond m_supportCount: free
     std::size_t m_supportCount = 0;
     long m_step = 0;

@@ -2,7 +2,6 @@
 
 #include <BulletCollision/CollisionShapes/btCollisionShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
-#include <BulletDynamics/Dynamics/btDynamicsWorld.h>
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -158,12 +157,7 @@ void RigidContacts::readJoints(const btCollisionObject& body) {
         const btRigidBody &first = joint->getRigidBodyA(), &second = joint->getRigidBodyB();
         const btRigidBody& other = &first == &body ? second : first;
         if (&other == &body || m_seen.count(&other) > 0 || defectOf(other)) continue;
-        const std::size_t known = m_joints.size();
         readJoint(*joint, m_world.getSolverInfo(), m_h, m_joints);
-        if (!m_hasMoved) continue;
-        for (std::size_t i = known; i < m_joints.size(); ++i)  // it has done what it does
-            m_joints[i].velocity =
-                m_joints[i].alongFirst.dot(twistOf(first)) + m_joints[i].alongSecond.dot(twistOf(second));
     }
 }
 
@@ -178,7 +172,7 @@ std::span<btPersistentManifold* const> RigidContacts::manifoldsOf(const btCollis
 double RigidContacts::pushOf(const btPersistentManifold& manifold, const btManifoldPoint& point) const {
     constexpr double kDeep = 1e-3;  // [m]
     const double distance = distanceOf(manifold, point);
-    return !m_hasMoved && distance < -kDeep ? speedApart(m_world.getSolverInfo(), distance, m_h) : 0.0;
+    return distance < -kDeep ? speedApart(m_world.getSolverInfo(), distance, m_h) : 0.0;
 }
 
 std::pmr::vector<btCollisionObject*> RigidContacts::join(std::span<btCollisionObject* const> bodies) {
@@ -220,6 +214,8 @@ void RigidContacts::addSupports(const btRigidBody& body, CoupledBody& coupled,
     addLoaded(body, coupled.position, supports);
     addImpacts(body, coupled.position, supports);
     addJoints(body, supports);
+    if (m_hasMoved)  // what holds it has let it do that
+        for (BodySupport& support : supports) support.velocity = support.row.dot(coupled.startTwist);
     holdBySupports(coupled, supports);
 }
 
@@ -234,7 +230,7 @@ void RigidContacts::addLoaded(const btRigidBody& body, const Vec3& centre, std::
             if (!bears(point)) continue;
             const Vec3 n = (first ? 1.0 : -1.0) * fromBullet(point.m_normalWorldOnB);
             const Vec3 at = fromBullet(first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
-            const double velocity = pointVelocity(other, at, ahead()).dot(n) + pushOf(*manifold, point);
+            const double velocity = pointVelocity(other, at, m_h).dot(n) + pushOf(*manifold, point);
             supports.push_back({rowOf(n, at, centre), velocity, weight});
         }
     }
@@ -249,7 +245,7 @@ void RigidContacts::addImpacts(const btRigidBody& body, const Vec3& centre, std:
         for (const auto& [onFirst, onSecond, normal, opening] : impact.points) {
             const Vec3 n = first ? normal : Vec3(-normal);
             const Vec3& at = first ? onFirst : onSecond;
-            supports.push_back({rowOf(n, at, centre), pointVelocity(other, at, ahead()).dot(n) + opening, weight});
+            supports.push_back({rowOf(n, at, centre), pointVelocity(other, at, m_h).dot(n) + opening, weight});
         }
     }
 }
@@ -261,7 +257,7 @@ void RigidContacts::addJoints(const btRigidBody& body, std::vector<BodySupport>&
         if ((!first && row.second != &body) || areJoined(body, other)) continue;
         const Vec6 &own = first ? row.alongFirst : row.alongSecond, &others = first ? row.alongSecond : row.alongFirst;
         const double give = std::max(mobilityAlong(other, others), mobilityAlong(body, own) / kSupport);
-        const double velocity = row.velocity - others.dot(freeTwistOf(other, ahead()));
+        const double velocity = row.velocity - others.dot(freeTwistOf(other, m_h));
         supports.push_back({own, velocity, 1.0 / (give + row.ease), row.range});
     }
 }
@@ -289,6 +285,10 @@ std::pmr::vector<RigidContact> RigidContacts::between(std::span<const Obstacle> 
         contacts.push_back({first->second, second->second, row.alongFirst, row.alongSecond,
                             1.0 / (mobility / kSupport + row.ease), row.velocity, row.range});
     }
+    if (m_hasMoved)
+        for (RigidContact& pair : contacts)
+            pair.velocity =
+                pair.rowA.dot(obstacles[pair.a].body.startTwist) + pair.rowB.dot(obstacles[pair.b].body.startTwist);
     return contacts;
 }
 

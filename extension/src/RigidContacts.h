@@ -1,4 +1,5 @@
 #pragma once
+#include <BulletDynamics/Dynamics/btDynamicsWorld.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
 #include <memory_resource>
@@ -58,7 +59,6 @@ class RigidContacts {
     using ObstacleIndex = std::pmr::unordered_map<const btCollisionObject*, int>;
     void addLoadedBetween(std::span<const Obstacle> obstacles, int own, const ObstacleIndex& indexOf,
                           std::pmr::vector<RigidContact>& contacts) const;
-    double ahead() const { return m_hasMoved ? 0.0 : m_h; }
     using Manifolds = std::pmr::vector<btPersistentManifold*>;
     std::span<btPersistentManifold* const> manifoldsOf(const btCollisionObject& object) const;
 

@@ -17,6 +17,7 @@
 #include <unordered_map>
 
 #include "ArticulatedBody.h"
+#include "BodyTwist.h"
 #include "CarriedVertices.h"
 #include "Checks.h"
 #include "ContactManifolds.h"
@@ -28,6 +29,7 @@
 #include "ShellContacts.h"
 #include "ShellProxy.h"
 #include "Sleepers.h"
+#include "SolvedIslands.h"
 #include "Teleports.h"
 #include "WarmStart.h"
 #include "jacket/Island.h"
@@ -121,6 +123,8 @@ struct ShellWorld::Impl {
     std::map<const ShellBody*, IslandSolver> solvers;  ///< of each island, by its first shell
     CarriedVertices carried;
     FastBodies::Solved solved{&memory};
+    SolvedIslands islands{&memory};
+    AllTakenBack takenBack{&memory};  ///< of bodies that are to be solved with anew
     /// Of a body whose step was solved in parts, where Bullet's one twist takes it elsewhere than it was solved to go.
     struct Alteration {
         btRigidBody* body;
@@ -167,6 +171,7 @@ void ShellWorld::remove(ShellBody& shell) {
     m_shells.erase(found);
     m_impl->solvers.clear();  // they remember contacts by shell
     m_impl->carried.clear();
+    m_impl->islands.forget(*removed);
     m_impl->checks.forget(*removed);
     m_report.shells = size();
     m_world.removeCollisionObject(removed->m_proxy.get());  // last: ends contacts, of which the user's callbacks hear
@@ -230,6 +235,7 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     releaseAnchors(*world);
     followTeleports(double(h));
     followGravity(double(h));
+    takeBackSolves(*world, double(h));
     std::pmr::vector<ShellBody*> all(&m_impl->memory);
     for (const auto& shell : m_shells) all.push_back(shell.get());
     FastBodies fast(*world, m_impl->obstacles, all, m_impl->solved, double(h));  // as Bullet has moved them
@@ -240,6 +246,7 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
     moveShells(*world, double(h));
     fast.holdBack();
     m_impl->solved.clear();
+    m_impl->islands.clear();
     sleepers.wake(gravity, double(h), std::exchange(m_impl->windChanged, false));
     std::erase_if(all, [](const ShellBody* shell) { return shell->isAsleep(); });
     m_report.awake = static_cast<int>(all.size());
@@ -250,7 +257,7 @@ void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
                     island.obstacles, [](const Obstacle& o) -> auto& { return *o.object; }))
                 for (ShellBody* shell : island.shells) shell->forgetSolvedVelocity();
             else
-                solveIsland(island, double(h));
+                solveIsland(island, double(h), &m_impl->islands);
         }
     for (const ShellBody* shell : all) m_report.contacts += static_cast<int>(shell->contacts().size());
     countStep();
@@ -315,12 +322,26 @@ void ShellWorld::solveNewcomers(btCollisionWorld& world, double h) {
     }
     world.computeOverlappingPairs();
     for (Island& island : IslandFinder(m_world, m_impl->obstacles, newcomers, m_impl->memory).find(h, true)) {
-        solveIsland(island, h);
+        solveIsland(island, h, nullptr);
         for (const Obstacle& obstacle : island.obstacles)
             if (const auto known = m_impl->solved.find(obstacle.object); known != m_impl->solved.end())
                 moveAnew(world, obstacle, known->second, h);
     }
     alterBodies(world, true);
+    while (!m_impl->takenBack.empty()) {  // of bodies that no shell comes near now
+        auto* object = const_cast<btCollisionObject*>(m_impl->takenBack.begin()->first);
+        react(*object, Vec6::Zero());
+    }
+}
+
+/// Of shells that were solved for a motion which a body of theirs has not made. For that which it has made they are
+/// newcomers.
+void ShellWorld::takeBackSolves(const btCollisionWorld& world, double h) {
+    m_impl->takenBack = m_impl->islands.takeBack(world, fromBullet(m_impl->gravity), h);
+    for (const auto& [object, solve] : m_impl->takenBack) {
+        m_impl->obstacles.noteStart(*object, solve.start);
+        m_impl->solved[object] = twistBetween(solve.start, fromBullet(object->getWorldTransform()), h);
+    }
 }
 
 /// Bodies that Bullet's one twist a step took elsewhere than they were solved to go. `isSolvedAnew`: Bullet had moved
@@ -343,13 +364,19 @@ void ShellWorld::moveShells(btCollisionWorld& world, double h) {
         if (!shell->isAsleep()) shell->publish();
 }
 
-void ShellWorld::solveIsland(Island& island, double h) {
+/// `islands`: to note it in, if there are any.
+void ShellWorld::solveIsland(Island& island, double h, SolvedIslands* islands) {
+    if (islands) islands->begin(island);
     std::pmr::vector<const ShellBody*> bodies(island.shells.begin(), island.shells.end(), &m_impl->memory);
     std::pmr::vector<Shell*> shells(&m_impl->memory);
     for (ShellBody* shell : island.shells) shells.push_back(&shell->m_shell);
     std::pmr::vector<CoupledBody> coupled(&m_impl->memory);
     coupled.reserve(island.obstacles.size());
-    for (const Obstacle& obstacle : island.obstacles) coupled.push_back(obstacle.body);
+    for (const Obstacle& obstacle : island.obstacles) {
+        coupled.push_back(obstacle.body);
+        if (const auto given = m_impl->takenBack.find(obstacle.object); given != m_impl->takenBack.end())
+            coupled.back().freeTwist -= obstacle.body.mass.ldlt().solve(given->second.impulse);
+    }
     ShellContacts contacts(bodies, island.obstacles, island.pairs, m_impl->contactMemory, m_impl->team.get());
     TimedDetector timed(contacts, m_report.secondsContact);
     IslandInput input;
@@ -375,6 +402,7 @@ void ShellWorld::solveIsland(Island& island, double h) {
     m_report.secondsSolve += seconds() - start;
     m_report.times += report.times;
     accept(island, report, coupled, h);
+    if (islands && report.finite && !report.passed && !report.mayPass) islands->end(m_world, island, coupled, h);
 }
 
 void ShellWorld::accept(Island& island, const StepReport& report, std::span<const CoupledBody> coupled, double h) {
@@ -406,7 +434,7 @@ void ShellWorld::accept(Island& island, const StepReport& report, std::span<cons
         m_impl->carried.addTied(shell, anchor.vertex, island.obstacles[anchor.body], endOf(anchor.body), anchor.point);
     }
     for (std::size_t b = 0; b < coupled.size(); ++b) {
-        react(*island.obstacles[b].object, coupled[b]);
+        react(*island.obstacles[b].object, coupled[b].impulse);
         btCollisionObject* object = island.obstacles[b].object;
         const bool isAltered = !coupled[b].prescribed && coupled[b].motion != h * coupled[b].twist;
         if (!report.passed || isAltered) m_impl->solved[object] = coupled[b].twist;  // a bent way is not swept again
@@ -423,16 +451,18 @@ void ShellWorld::countStep() {
     m_report.rejectedSteps += m_report.finite ? 0 : 1;
 }
 
-void ShellWorld::react(btCollisionObject& object, const CoupledBody& coupled) {
-    if (object.isStaticOrKinematicObject() || coupled.impulse.isZero(0.0)) return;
+/// `given`: impulse and moment of a solve [N s, N m s], instead of those that were taken back.
+void ShellWorld::react(btCollisionObject& object, const Vec6& given) {
+    const auto before = m_impl->takenBack.extract(&object);
+    if (object.isStaticOrKinematicObject() || (given.isZero(0.0) && !before)) return;
     const double still = 0.02 * double(m_impl->gravity.length()) / 60.0;
     if (auto* link = btMultiBodyLinkCollider::upcast(&object)) {
-        pushLink(*link, coupled.impulse, still);
+        pushLink(*link, given, still);
         return;
     }
     btRigidBody* body = btRigidBody::upcast(&object);
     if (!body) return;
-    const Vec3 impulse = coupled.impulse.head<3>();
+    const Vec3 impulse = given.head<3>();
     Push& last = m_impl->pushes[&object];
     if (!body->isActive()) {  // a feather does not wake a sleeping crate, nor does what it fell asleep under
         const double kick = double(body->getInvMass()) * (impulse - last.impulse).norm();
@@ -441,8 +471,9 @@ void ShellWorld::react(btCollisionObject& object, const CoupledBody& coupled) {
     foretellLoad(*m_world.getDispatcher(), object, impulse - last.impulse);
     last = {impulse, true};
     if (!body->isActive()) return;
-    body->applyCentralImpulse(toBullet(Vec3(coupled.impulse.head<3>())));
-    body->applyTorqueImpulse(toBullet(Vec3(coupled.impulse.tail<3>())));
+    const Vec6 change = before ? Vec6(given - before.mapped().impulse) : given;
+    body->applyCentralImpulse(toBullet(Vec3(change.head<3>())));
+    body->applyTorqueImpulse(toBullet(Vec3(change.tail<3>())));
 }
 
 /// Bodies that no shell pushes any more.

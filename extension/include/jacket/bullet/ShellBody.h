@@ -128,6 +128,7 @@ class ShellBody {
     friend class FastBodies;
     friend class IslandFinder;
     friend class Sleepers;
+    friend class SolvedIslands;
     friend class Teleports;
     ShellBody(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options);
     struct Anchor {
@@ -146,6 +147,13 @@ class ShellBody {
     std::vector<BodyContact> m_contacts;
     double m_frictionLoss = 0.0;
     Vec3 m_exchanged = Vec3::Zero();
+    struct Before {
+        Points velocities;  ///< empty: it has none
+        Vec3 exchanged = Vec3::Zero();
+        double frictionLoss = 0.0;
+        unsigned revision = 0;  ///< of the shell when it had been solved
+    };
+    Before m_before;        ///< the last solve with free bodies
     void forgetImpulses();  ///< of the last substep
     void note(const BodyContact& contact);
     void note(const jacket::Anchor& anchor);

@@ -15,6 +15,7 @@ class btDynamicsWorld;
 namespace jacket::bullet {
 
 struct Island;
+class SolvedIslands;
 
 /// Whether a body that goes such a way [m] in a time [s] is teleported, and does not move: faster than 50 m/s, and
 /// farther than four times the radius of the ball about its origin that holds its shape. One that is pushes nothing.
@@ -93,9 +94,10 @@ class ShellWorld : public btActionInterface {
     void solveNewcomers(btCollisionWorld& world, double h);
     void alterBodies(btCollisionWorld& world, bool isSolvedAnew);
     void moveShells(btCollisionWorld& world, double h);
-    void solveIsland(Island& island, double h);
+    void takeBackSolves(const btCollisionWorld& world, double h);
+    void solveIsland(Island& island, double h, SolvedIslands* islands);
     void accept(Island& island, const StepReport& report, std::span<const CoupledBody> coupled, double h);
-    void react(btCollisionObject& object, const CoupledBody& coupled);
+    void react(btCollisionObject& object, const Vec6& given);
     void forgetPushes(const btCollisionWorld& world);
     void updateAllBounds(double h);
     void updateBounds(ShellBody& shell, double fastest, double h);

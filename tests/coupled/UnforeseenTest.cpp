@@ -1,0 +1,147 @@
+// Bodies that do something else in a step than the shells were solved for: what their users and other actions do to
+// them between two solves, and what Bullet's own solve leaves over.
+#include <btBulletDynamicsCommon.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <tuple>
+
+#include "support/FreeScenes.h"
+
+namespace jacket::bullet::testing {
+namespace {
+
+using jacket::testing::totalMomentum;
+using jacket::testing::toVec3;
+
+double deepestIn(const Bodies& bodies, const ShellBody& shell) {
+    double depth = 0.0;
+    for (const btRigidBody* body : bodies) depth = std::max(depth, penetration(shell, *body));
+    return depth;
+}
+
+/// Speed that the user gives a body [m/s], steps a second.
+class KickedBall : public ::testing::TestWithParam<std::tuple<double, int>> {};
+
+/// In steps of 1/240 s contacts of one start in three do not settle in the step of the kick.
+TEST_P(KickedBall, TakesTheClothOnItAlong) {
+    constexpr int kStarts = 4;
+    const auto [speed, stepsASecond] = GetParam();
+    const double h = 1.0 / stepsASecond;
+    double sum = 0.0;
+    for (int start = 0; start < kStarts; ++start) {
+        BulletScene scene;
+        scene.addFloor();
+        Bodies bodies;
+        const ShellBody& cloth =
+            free_scenes::ballUnderCloth("ball", 2.0)
+                .make(scene, materials::cotton(), 16, Vec3(0.003 * start, 0, 0.002 * start), bodies);
+        scene.run(1.0, h);
+        bodies[0]->activate();
+        bodies[0]->setLinearVelocity(btVector3(0, btScalar(speed), 0));
+        double deepest = 0.0;
+        for (int i = 0; i < stepsASecond / 4; ++i) {
+            scene.step(h);
+            deepest = std::max(deepest, deepestIn(bodies, cloth));
+            EXPECT_LT(cloth.shell().velocities().colwise().norm().maxCoeff(), 2.0 * speed + 2.0) << "step " << i;
+        }
+        if (stepsASecond == 60) {
+            EXPECT_LT(deepest, 5e-4) << "start " << start;
+        }
+        sum += deepest;
+    }
+    EXPECT_LT(sum / kStarts, 0.25 * speed * h);
+}
+INSTANTIATE_TEST_SUITE_P(Speeds, KickedBall,
+                         ::testing::Combine(::testing::Values(2.0, 5.0, 10.0), ::testing::Values(60, 240)));
+
+/// A sheet that presses on a ball in free space, and a ball that its user strikes: five solves are done anew.
+TEST(Unforeseen, MomentumIsKeptAndTheLedgerCountsItOnce) {
+    BulletScene scene;
+    scene.world.setGravity(btVector3(0, 0, 0));
+    auto& ball = scene.addSphere(0.1, 0.5, btVector3(0, 0, 0));
+    auto& sheet = scene.shells->add(squareSheet(0.4, 10), materials::cotton());
+    place(sheet, {0.004, 0.11, 0.007});
+    sheet.setVelocity(btVector3(0, -1, 0));
+    const Vec3 thrown(0, -sheet.shell().masses().sum(), 0);
+    Vec3 struck = Vec3::Zero();
+    for (int i = 0; i < 40; ++i) {
+        if (i % 8 == 7) {
+            const btVector3 kick(btScalar(0.4), btScalar(i % 16 == 7 ? 1.5 : -1.0), btScalar(-0.3));
+            ball.applyCentralImpulse(kick);
+            struck += toVec3(kick);
+        }
+        scene.step(kStep);
+        EXPECT_LT((totalMomentum(scene.world, *scene.shells) - thrown - struck).norm(), 1e-5) << "step " << i;
+        const Vec3 given = 0.5 * toVec3(ball.getLinearVelocity()) - struck;
+        EXPECT_LT((sheet.ledger().exchanged - given).norm(), 1e-5) << "step " << i;
+        EXPECT_LT(penetration(sheet, ball), 5e-4) << "step " << i;
+    }
+}
+
+/// Springs under a box, as a vehicle's, which act when the shells have been solved.
+struct Springs : btActionInterface {
+    btRigidBody& body;
+    explicit Springs(btRigidBody& on) : body(on) {}
+    void updateAction(btCollisionWorld*, btScalar h) override {
+        const btScalar off = btScalar(0.5) - body.getWorldTransform().getOrigin().y();
+        const btScalar push = btScalar(9.81) + btScalar(60) * off - btScalar(8) * body.getLinearVelocity().y();
+        body.applyCentralImpulse(btVector3(0, push * h / body.getInvMass(), 0));
+        body.applyTorqueImpulse(-body.getAngularVelocity() * h);
+    }
+    void debugDraw(btIDebugDraw*) override {}
+};
+
+TEST(Unforeseen, AClothLiesOnABoxThatAnotherActionHoldsUp) {
+    for (const bool actsFirst : {false, true}) {
+        BulletScene scene;
+        Bodies bodies{&scene.addBox(btVector3(btScalar(0.2), btScalar(0.1), btScalar(0.2)), 10.0,
+                                    btVector3(0, btScalar(0.5), 0))};
+        bodies[0]->setActivationState(DISABLE_DEACTIVATION);
+        Springs springs(*bodies[0]);
+        if (actsFirst) scene.world.removeAction(scene.shells.get());
+        scene.world.addAction(&springs);
+        if (actsFirst) scene.world.addAction(scene.shells.get());
+        const ShellBody& cloth = free_scenes::addSheet(scene, materials::cotton(), 16, {0.01, 0.605, 0.02});
+        for (int i = 0; i < 120; ++i) {
+            scene.step(kStep);
+            EXPECT_LT(deepestIn(bodies, cloth), 5e-4) << actsFirst << " step " << i;
+        }
+        EXPECT_NEAR(double(bodies[0]->getWorldTransform().getOrigin().y()), 0.5, 0.01);
+        scene.world.removeAction(&springs);
+    }
+}
+
+/// A jolt in every joint, which Bullet's iterations leave much of.
+TEST(Unforeseen, AFigureOnJointsHitsTheFloorUnderACloth) {
+    for (const int start : {0, 1}) {
+        const auto run = free_scenes::clothOnRagdoll("figure").run(materials::cotton(), 16, start);
+        EXPECT_LT(run.outcome.deepest, 1e-3) << start;
+        EXPECT_LE(run.outcome.unsettled, 2) << start;
+    }
+}
+
+/// Then the solve is left as it is.
+TEST(Unforeseen, ABodyOrAShellMayBeGoneBeforeItsSolveIsDoneAnew) {
+    for (const bool isShell : {false, true}) {
+        BulletScene scene;
+        scene.addFloor();
+        Bodies bodies;
+        auto& cloth =
+            free_scenes::pileUnderCloth("boxes", 2.0).make(scene, materials::cotton(), 12, Vec3::Zero(), bodies);
+        auto& other = free_scenes::addSheet(scene, materials::cotton(), 12, {0.05, 0.6, 0.03});
+        scene.run(0.5, kStep);
+        bodies[4]->setLinearVelocity(btVector3(0, 5, 0));
+        if (isShell)
+            scene.shells->remove(other);
+        else
+            scene.remove(*bodies[3]);
+        scene.run(0.5, kStep);
+        EXPECT_TRUE(cloth.shell().positions().allFinite());
+        EXPECT_EQ(scene.shells->lastStep().rejectedSteps, 0);
+        EXPECT_LT(cloth.shell().velocities().colwise().norm().maxCoeff(), 10.0);
+    }
+}
+
+}  // namespace
+}  // namespace jacket::bullet::testing
