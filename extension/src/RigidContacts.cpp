@@ -157,7 +157,7 @@ void RigidContacts::readJoints(const btCollisionObject& body) {
         const btRigidBody &first = joint->getRigidBodyA(), &second = joint->getRigidBodyB();
         const btRigidBody& other = &first == &body ? second : first;
         if (&other == &body || m_seen.count(&other) > 0 || defectOf(other)) continue;
-        readJoint(*joint, m_world.getSolverInfo(), m_h, m_joints);
+        readJoint(*joint, m_jointSolver, m_h, m_joints);
     }
 }
 

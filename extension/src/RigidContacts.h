@@ -36,7 +36,10 @@ class RigidContacts {
           m_impacts(&memory),
           m_jointsOf(&memory),
           m_joints(&memory),
-          m_joined(&memory) {}
+          m_joined(&memory),
+          m_jointSolver(world.getSolverInfo()) {
+        m_jointSolver.m_erp = btScalar(0);
+    }
     /// To be called first. The free bodies of the piles that these belong to, up to a number that a solve can carry.
     /// Contacts and joints between any of all these are `between`'s, and not `addSupports`' any more.
     std::pmr::vector<btCollisionObject*> join(std::span<btCollisionObject* const> bodies);
@@ -76,6 +79,9 @@ class RigidContacts {
     std::pmr::unordered_map<const btCollisionObject*, std::pmr::vector<btTypedConstraint*>> m_jointsOf;
     std::pmr::vector<JointRow> m_joints;  ///< of the joined bodies
     std::pmr::unordered_set<const btCollisionObject*> m_joined;
+    /// But joints' errors do not count: how fast Bullet's iterations make them good, far too slowly in chains, is seen
+    /// when it has.
+    btContactSolverInfo m_jointSolver;
 };
 
 }  // namespace jacket::bullet
