@@ -402,7 +402,7 @@ void ShellWorld::solveIsland(Island& island, double h, SolvedIslands* islands) {
     m_report.secondsSolve += seconds() - start;
     m_report.times += report.times;
     accept(island, report, coupled, h);
-    if (islands && report.finite && !report.passed && !report.mayPass) islands->end(m_world, island, coupled, h);
+    if (islands && report.finite && !report.passed && !report.mayPass) islands->end(island, coupled, h);
 }
 
 void ShellWorld::accept(Island& island, const StepReport& report, std::span<const CoupledBody> coupled, double h) {

@@ -49,15 +49,14 @@ void SolvedIslands::begin(const Island& island) {
     }
 }
 
-void SolvedIslands::end(const btCollisionWorld& world, const Island& island, std::span<const CoupledBody> coupled,
-                        double h) {
+void SolvedIslands::end(const Island& island, std::span<const CoupledBody> coupled, double h) {
     Solved solved(&m_memory);
     for (std::size_t b = 0; b < coupled.size(); ++b) {
         if (coupled[b].prescribed) continue;
         if (!isFreeBody(island.obstacles[b])) return;  // what a link was given moves others
         btCollisionObject* object = island.obstacles[b].object;
         solved.bodies.push_back({object,
-                                 idOf(world, object),
+                                 object->getBroadphaseHandle()->getUid(),
                                  coupled[b].radius,
                                  coupled[b].motion / h,
                                  {island.obstacles[b].start, coupled[b].impulse}});

@@ -25,8 +25,8 @@ class SolvedIslands {
     explicit SolvedIslands(std::pmr::memory_resource* memory) : m_memory(*memory), m_islands(memory) {}
     /// Before an island is solved: keeps its shells' velocities.
     void begin(const Island& island);
-    /// After that: how each obstacle was solved to move, if not in parts, by a twist that Bullet does not follow.
-    void end(const btCollisionWorld& world, const Island& island, std::span<const CoupledBody> coupled, double h);
+    /// After that: how each free body was solved to move, and what it was given.
+    void end(const Island& island, std::span<const CoupledBody> coupled, double h);
     /// Shells of solves that are void have no solved velocity any more. Returns what these had given their bodies,
     /// which still have it.
     AllTakenBack takeBack(const btCollisionWorld& world, const Vec3& gravity, double h) const;
