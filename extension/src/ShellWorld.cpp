@@ -31,6 +31,7 @@
 #include "Sleepers.h"
 #include "SolvedIslands.h"
 #include "Teleports.h"
+#include "TurnToAct.h"
 #include "WarmStart.h"
 #include "jacket/Island.h"
 
@@ -118,6 +119,7 @@ struct Push {
 
 struct ShellWorld::Impl {
     std::pmr::unsynchronized_pool_resource memory;  ///< what a step gives back, the next one takes
+    TurnToAct turn;
     ShellContacts::Memory contactMemory;
     Obstacles obstacles;
     std::map<const ShellBody*, IslandSolver> solvers;  ///< of each island, by its first shell
@@ -151,6 +153,7 @@ ShellWorld::ShellWorld(btDynamicsWorld& world) : m_world(world), m_impl(std::mak
 ShellWorld::~ShellWorld() {
     for (const auto& shell : m_shells) m_world.removeCollisionObject(shell->m_proxy.get());
     m_world.removeAction(this);
+    m_world.removeAction(this);  // where it waits to be called again, see TurnToAct
 }
 
 ShellBody& ShellWorld::add(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options) {
@@ -217,6 +220,7 @@ std::vector<std::string> ShellWorld::takeWarnings() {
 /// then the next solve looks at this configuration, and its impulses enter Bullet's next solve. Shells among kinematic
 /// bodies have that solve when these have moved.
 void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
+    if (!m_impl->turn.isLast(m_world, *this)) return;
     if (!m_impl->checks.isLength(h)) {
         ++m_report.rejectedSteps;
         return;

@@ -1,5 +1,5 @@
-// Bodies that do something else in a step than the shells were solved for: what their users and other actions do to
-// them between two solves, and what Bullet's own solve leaves over.
+// Bodies that do something else in a step than the shells were solved for: what their users do to them between two
+// solves, and what Bullet's own solve leaves over.
 #include <btBulletDynamicsCommon.h>
 #include <gtest/gtest.h>
 
@@ -76,39 +76,6 @@ TEST(Unforeseen, MomentumIsKeptAndTheLedgerCountsItOnce) {
         const Vec3 given = 0.5 * toVec3(ball.getLinearVelocity()) - struck;
         EXPECT_LT((sheet.ledger().exchanged - given).norm(), 1e-5) << "step " << i;
         EXPECT_LT(penetration(sheet, ball), 5e-4) << "step " << i;
-    }
-}
-
-/// Springs under a box, as a vehicle's, which act when the shells have been solved.
-struct Springs : btActionInterface {
-    btRigidBody& body;
-    explicit Springs(btRigidBody& on) : body(on) {}
-    void updateAction(btCollisionWorld*, btScalar h) override {
-        const btScalar off = btScalar(0.5) - body.getWorldTransform().getOrigin().y();
-        const btScalar push = btScalar(9.81) + btScalar(60) * off - btScalar(8) * body.getLinearVelocity().y();
-        body.applyCentralImpulse(btVector3(0, push * h / body.getInvMass(), 0));
-        body.applyTorqueImpulse(-body.getAngularVelocity() * h);
-    }
-    void debugDraw(btIDebugDraw*) override {}
-};
-
-TEST(Unforeseen, AClothLiesOnABoxThatAnotherActionHoldsUp) {
-    for (const bool actsFirst : {false, true}) {
-        BulletScene scene;
-        Bodies bodies{&scene.addBox(btVector3(btScalar(0.2), btScalar(0.1), btScalar(0.2)), 10.0,
-                                    btVector3(0, btScalar(0.5), 0))};
-        bodies[0]->setActivationState(DISABLE_DEACTIVATION);
-        Springs springs(*bodies[0]);
-        if (actsFirst) scene.world.removeAction(scene.shells.get());
-        scene.world.addAction(&springs);
-        if (actsFirst) scene.world.addAction(scene.shells.get());
-        const ShellBody& cloth = free_scenes::addSheet(scene, materials::cotton(), 16, {0.01, 0.605, 0.02});
-        for (int i = 0; i < 120; ++i) {
-            scene.step(kStep);
-            EXPECT_LT(deepestIn(bodies, cloth), 5e-4) << actsFirst << " step " << i;
-        }
-        EXPECT_NEAR(double(bodies[0]->getWorldTransform().getOrigin().y()), 0.5, 0.01);
-        scene.world.removeAction(&springs);
     }
 }
 

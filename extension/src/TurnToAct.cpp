@@ -1,0 +1,68 @@
+#include "TurnToAct.h"
+
+#include <BulletDynamics/Dynamics/btDiscreteDynamicsWorld.h>
+
+#include <utility>
+
+#include "jacket/bullet/ShellWorld.h"
+
+namespace jacket::bullet {
+namespace {
+
+/// Bullet's list of actions, which it shows to worlds alone.
+struct Actions : btDiscreteDynamicsWorld {
+    using List = btAlignedObjectArray<btActionInterface*>;
+    static List& of(btDiscreteDynamicsWorld& world) { return world.*(&Actions::m_actions); }
+};
+
+bool areShells(const btActionInterface* action) {
+    return dynamic_cast<const ShellWorld*>(action) != nullptr;
+}
+
+/// The place of an action from another one on; the list's size: none.
+int findFrom(const Actions::List& actions, int place, const btActionInterface* action) {
+    while (place < actions.size() && actions[place] != action) ++place;
+    return place;
+}
+
+/// Takes what is at a place out, and keeps the others in order.
+void erase(Actions::List& actions, int place) {
+    for (; place + 1 < actions.size(); ++place) actions[place] = actions[place + 1];
+    actions.pop_back();
+}
+
+bool areOthersBehind(const Actions::List& actions, int place) {
+    while (++place < actions.size())
+        if (!areShells(actions[place])) return true;
+    return false;
+}
+
+/// Those of shells that stand in the list once more, farther behind.
+void closeFormerPlaces(Actions::List& actions) {
+    for (int i = 0; i < actions.size();) {
+        const bool isFormer = areShells(actions[i]) && findFrom(actions, i + 1, actions[i]) < actions.size();
+        isFormer ? erase(actions, i) : void(++i);
+    }
+}
+
+}  // namespace
+
+/// Bullet walks through the list by places, also through what is added meanwhile. So the last in it alone may take out
+/// what stands before.
+bool TurnToAct::isLast(btDynamicsWorld& world, ShellWorld& shells) {
+    auto* const discrete = dynamic_cast<btDiscreteDynamicsWorld*>(&world);
+    if (!discrete) return true;
+    Actions::List& actions = Actions::of(*discrete);
+    const int own = findFrom(actions, 0, &shells);
+    if (own == actions.size()) return true;  // it was called by its user
+    if (!std::exchange(m_waits, false) && areOthersBehind(actions, own)) {
+        if (const int again = findFrom(actions, own + 1, &shells); again < actions.size()) erase(actions, again);
+        actions.push_back(&shells);
+        m_waits = true;
+        return false;
+    }
+    if (actions[actions.size() - 1] == &shells) closeFormerPlaces(actions);
+    return true;
+}
+
+}  // namespace jacket::bullet
