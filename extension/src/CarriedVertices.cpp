@@ -56,9 +56,7 @@ void CarriedVertices::move(const btCollisionWorld& world, const Vec3& gravity, d
 
 void CarriedVertices::moveToStart(const btCollisionWorld& world, Obstacles& obstacles, const Vec3& gravity, double h) {
     std::erase_if(m_vertices, [](const Carried& c) { return !c.shell->m_hasVelocity; });  // of a solve that is void
-    std::erase_if(m_moved, [&](const Carried& c) {
-        return idOf(world, c.object) != c.objectId || !c.object->isKinematicObject();
-    });
+    std::erase_if(m_moved, [&](const Carried& c) { return idOf(world, c.object) != c.objectId || !isLed(*c.object); });
     const auto isToMove = [](const Carried& c) { return !c.shell->m_hasVelocity && !c.shell->isAsleep(); };
     const auto others = std::partition(m_moved.begin(), m_moved.end(), isToMove);
     m_goals.clear();

@@ -88,22 +88,34 @@ class Obstacles {
     bool m_gravityIsNoForce = false;
 };
 
-/// Whether an object never moves. Kinematic bodies are usually static as well: Bullet marks all of mass 0.
-inline bool standsStill(const btCollisionObject& object) {
-    return object.isStaticObject() && !object.isKinematicObject();
+/// Whether it is a rigid body or a link that shells and others may push.
+inline bool mayBePushed(const btCollisionObject& object) {
+    constexpr int kPushed = btCollisionObject::CO_RIGID_BODY | btCollisionObject::CO_FEATHERSTONE_LINK;
+    return !object.isStaticOrKinematicObject() && (object.getInternalType() & kPushed) != 0;
 }
 
-/// Whether some of the objects are kinematic and the others static: their user alone knows how they move, and no shell
-/// could push them. `objectOf`: the btCollisionObject of an entry.
+/// Whether an object never moves. Kinematic bodies are usually static as well, as Bullet marks all of mass 0, and so is
+/// the ghost of a character controller unless that is taken from it.
+inline bool standsStill(const btCollisionObject& object) {
+    const bool isGhost = object.getInternalType() == btCollisionObject::CO_GHOST_OBJECT;
+    return object.isStaticObject() && !object.isKinematicObject() && !isGhost;
+}
+
+/// Whether its user alone knows how it moves, and no shell could push it.
+inline bool isLed(const btCollisionObject& object) {
+    return !mayBePushed(object) && !standsStill(object);
+}
+
+/// Whether some of the objects are led and the others stand still. `objectOf`: the btCollisionObject of an entry.
 template <class Entries, class ObjectOf>
 bool areLedByUser(const Entries& entries, ObjectOf objectOf) {
-    bool isAnyKinematic = false;
+    bool isAnyLed = false;
     for (const auto& entry : entries) {
         const btCollisionObject& object = objectOf(entry);
-        if (!object.isStaticOrKinematicObject()) return false;
-        isAnyKinematic = isAnyKinematic || object.isKinematicObject();
+        if (mayBePushed(object)) return false;
+        isAnyLed = isAnyLed || isLed(object);
     }
-    return isAnyKinematic;
+    return isAnyLed;
 }
 
 /// Pose after moving with a twist for a time: rotation by the exponential of the angular velocity.

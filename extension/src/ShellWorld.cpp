@@ -1,6 +1,7 @@
 #include "jacket/bullet/ShellWorld.h"
 
 #include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
+#include <BulletCollision/CollisionDispatch/btGhostObject.h>
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
@@ -69,11 +70,13 @@ class TimedDetector : public ContactDetector {
     double& m_sum;
 };
 
-/// Speed of a collision object's centre of mass [m/s].
-double speedOf(const btCollisionObject& object) {
+/// Speed of a collision object's centre of mass; of a ghost, which has none, by its last two poses [m/s].
+double speedOf(const btCollisionObject& object, Obstacles& obstacles, double h) {
     if (const auto* body = btRigidBody::upcast(&object)) return double(body->getLinearVelocity().length());
     if (const auto* link = btMultiBodyLinkCollider::upcast(&object)) return twistOf(*link).head<3>().norm();
-    return 0.0;
+    if (!btGhostObject::upcast(&object)) return 0.0;
+    const Vec3 way = fromBullet(object.getWorldTransform().getOrigin()) - obstacles.startOf(object, h).translation();
+    return way.norm() / h;
 }
 
 /// Where Bullet takes a body with a twist in a step: it does not let it turn by more than a certain angle.
@@ -100,13 +103,21 @@ btVector3 usableGravity(const btDynamicsWorld& world, const btVector3& last) {
 }
 
 /// Fastest that any point of any moving object goes, roughly: how far bounds must reach ahead [m/s].
-double fastestObject(const btCollisionWorld& world) {
+double fastestObject(const btCollisionWorld& world, Obstacles& obstacles, double h) {
     double speed = 0.0;
     const auto& objects = world.getCollisionObjectArray();
     for (int i = 0; i < objects.size(); ++i) {
-        if (!standsStill(*objects[i]) && objects[i]->isActive()) speed = std::max(speed, speedOf(*objects[i]));
+        const btCollisionObject& object = *objects[i];
+        if (!standsStill(object) && object.isActive()) speed = std::max(speed, speedOf(object, obstacles, h));
     }
     return speed;
+}
+
+/// Of ghosts: character controllers, which are actions, move them when Bullet has looked for pairs.
+void updateBoundsOfGhosts(btCollisionWorld& world) {
+    const auto& objects = world.getCollisionObjectArray();
+    for (int i = 0; i < objects.size(); ++i)
+        if (btGhostObject::upcast(objects[i])) world.updateSingleAabb(objects[i]);
 }
 
 }  // namespace
@@ -159,7 +170,8 @@ ShellWorld::~ShellWorld() {
 ShellBody& ShellWorld::add(const TriangleMesh& mesh, const ShellMaterial& material, const ShellOptions& options) {
     std::unique_ptr<ShellBody> shell(new ShellBody(mesh, material, options));
     ShellBody& added = *shell;
-    updateBounds(added, fastestObject(m_world), 1.0 / 60.0);
+    constexpr double kUsualStep = 1.0 / 60.0;
+    updateBounds(added, fastestObject(m_world, m_impl->obstacles, kUsualStep), kUsualStep);
     m_shells.push_back(std::move(shell));
     m_world.addCollisionObject(added.m_proxy.get(), options.collisionGroup, options.collisionMask);
     m_report.shells = size();
@@ -319,7 +331,8 @@ void ShellWorld::solveNewcomers(btCollisionWorld& world, double h) {
         if (!shell->m_hasVelocity && !shell->isAsleep()) newcomers.push_back(shell.get());
     if (newcomers.empty()) return;
     m_impl->carried.moveToStart(world, m_impl->obstacles, fromBullet(m_impl->gravity), h);
-    const double fastest = fastestObject(world);
+    const double fastest = fastestObject(world, m_impl->obstacles, h);
+    updateBoundsOfGhosts(world);
     for (ShellBody* shell : newcomers) {  // Bullet's pairs know nothing of how they move
         updateBounds(*shell, fastest, h);
         world.updateSingleAabb(shell->m_proxy.get());
@@ -496,7 +509,7 @@ void ShellWorld::forgetPushes(const btCollisionWorld& world) {
 
 /// Bounds of sleeping shells stay, unless something has become faster than they allow for.
 void ShellWorld::updateAllBounds(double h) {
-    const double fastest = fastestObject(m_world);
+    const double fastest = fastestObject(m_world, m_impl->obstacles, h);
     for (const auto& shell : m_shells)
         if (!shell->isAsleep() || fastest > shell->m_rest->boundsSpeed) updateBounds(*shell, fastest, h);
 }

@@ -33,7 +33,7 @@ double waitForCalm() {
 /// Whether it stands still until something wakes it.
 bool sleeps(const btCollisionObject& object) {
     if (const auto* link = btMultiBodyLinkCollider::upcast(&object)) return isPrescribed(*link);
-    return object.isStaticOrKinematicObject() || !object.isActive();
+    return !mayBePushed(object) || !object.isActive();
 }
 
 /// Whether Bullet would let it sleep by now. Multibodies do not say; they must be the first.
@@ -44,7 +44,7 @@ bool mayFallAsleep(const btCollisionObject& object) {
 
 /// Whether it never moves, or has not moved for a while.
 bool isQuiet(const btCollisionObject& object) {
-    if (object.isStaticOrKinematicObject()) return standsStill(object);
+    if (!mayBePushed(object)) return standsStill(object);
     return btRigidBody::upcast(&object) && mayFallAsleep(object);
 }
 
@@ -60,7 +60,7 @@ bool liesOnAnother(const Island& island, int body, const Vec3& gravity) {
 bool stands(const Island& island, int body, const Vec3& gravity) {
     const Obstacle& obstacle = island.obstacles[body];
     const CoupledBody& coupled = obstacle.body;
-    if (obstacle.object->isStaticOrKinematicObject()) return standsStill(*obstacle.object);
+    if (!mayBePushed(*obstacle.object)) return standsStill(*obstacle.object);
     return coupled.startTwist.head<3>().norm() < kSlow &&
            coupled.radius * coupled.startTwist.tail<3>().norm() < kSlow &&
            (!coupled.supports.empty() || liesOnAnother(island, body, gravity));
@@ -108,7 +108,7 @@ bool Sleepers::contains(const ShellRest::Support& support) const {
 void Sleepers::wakeUp(ShellBody& shell) {
     ShellRest& rest = *shell.m_rest;
     for (const auto& support : rest.supports)
-        if (contains(support) && !support.object->isStaticOrKinematicObject()) support.object->activate();
+        if (contains(support) && mayBePushed(*support.object)) support.object->activate();
     const double boundsSpeed = rest.boundsSpeed;
     rest = {};
     rest.boundsSpeed = boundsSpeed;

@@ -61,8 +61,7 @@ std::optional<Frame> Teleports::offsetOf(const ShellBody& body) {
     if (anchors.empty() || body.m_hasVelocity || body.isAsleep() || isPinnedOrGuided(body.shell())) return std::nullopt;
     const ShellBody::Anchor& first = anchors.front();
     const auto isOfFirst = [&](const auto& anchor) { return anchor.body == first.body; };
-    if (!first.body->isKinematicObject() || !std::all_of(anchors.begin(), anchors.end(), isOfFirst))
-        return std::nullopt;
+    if (!isLed(*first.body) || !std::all_of(anchors.begin(), anchors.end(), isOfFirst)) return std::nullopt;
     const Frame start = m_obstacles.startOf(*first.body, m_h);
     const Vec3 now = fromBullet(first.body->getWorldTransform().getOrigin());
     const Vec3 place = start * fromBullet(first.local);
@@ -79,7 +78,7 @@ std::optional<Frame> Teleports::leapOf(const ShellBody::Anchor& anchor) {
     const Frame before = fromBullet(anchor.pose), start = m_obstacles.startOf(body, m_h);
     const double way = (start.translation() - before.translation()).norm();
     const double motion = (fromBullet(body.getWorldTransform().getOrigin()) - start.translation()).norm();
-    const bool isSent = body.isStaticOrKinematicObject() ? motion == 0.0 : way > motion;
+    const bool isSent = !mayBePushed(body) ? motion == 0.0 : way > motion;
     if (!isSent || !isTeleport(body, way, m_h)) return std::nullopt;
     return start * before.inverse(Eigen::Isometry);
 }

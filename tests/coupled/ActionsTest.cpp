@@ -1,13 +1,105 @@
-// Other actions of a world, as the springs of a vehicle.
+// Other actions of a world: character controllers, which move ghost objects, and springs as of a vehicle.
+#include <BulletCollision/CollisionDispatch/btGhostObject.h>
+#include <BulletDynamics/Character/btKinematicCharacterController.h>
 #include <btBulletDynamicsCommon.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <tuple>
 
 #include "support/HardScenes.h"
 
 namespace jacket::bullet::testing {
 namespace {
+
+/// A figure of 1.5 m that walks along z.
+struct Character {
+    static constexpr double kHalf = 0.75;  ///< of its height [m]
+    btDynamicsWorld& world;
+    btGhostPairCallback pairs;
+    btCapsuleShape shape{btScalar(0.25), btScalar(1)};
+    btPairCachingGhostObject ghost;
+    btKinematicCharacterController controller{&ghost, &shape, btScalar(0.1), btVector3(0, 1, 0)};
+
+    Character(btDynamicsWorld& in, double z) : world(in) {
+        world.getPairCache()->setInternalGhostPairCallback(&pairs);
+        ghost.setCollisionShape(&shape);
+        ghost.setCollisionFlags(btCollisionObject::CF_CHARACTER_OBJECT);
+        btTransform pose = btTransform::getIdentity();
+        pose.setOrigin(btVector3(0, btScalar(kHalf + 0.01), btScalar(z)));
+        ghost.setWorldTransform(pose);
+        world.addCollisionObject(&ghost, btBroadphaseProxy::CharacterFilter);
+        world.addAction(&controller);
+    }
+    ~Character() {
+        world.removeAction(&controller);
+        world.removeCollisionObject(&ghost);
+        world.getPairCache()->setInternalGhostPairCallback(nullptr);
+    }
+    void walk(double way) { controller.setWalkDirection(btVector3(0, 0, btScalar(way))); }
+    double z() const { return double(ghost.getWorldTransform().getOrigin().z()); }
+};
+
+/// Speed [m/s], steps a second.
+class WalkingCharacter : public ::testing::TestWithParam<std::tuple<double, int>> {
+  protected:
+    const double speed = std::get<0>(GetParam()), h = 1.0 / std::get<1>(GetParam());
+    BulletScene scene;
+    btRigidBody& ground = scene.addBox(btVector3(20, 1, 20), 0.0, btVector3(0, -1, 0));
+
+    /// Walks from one time to another, and jumps in between.
+    void run(Character& character, const ShellBody& sheet, double from, double to, double jump = -1.0) {
+        for (int i = 0; i < int(2.5 / h + 0.5); ++i) {
+            const double t = i * h;
+            character.walk(t >= from && t < to ? speed * h : 0.0);
+            if (t >= jump && t - h < jump) character.controller.jump(btVector3(0, 5, 0));
+            scene.step(h);
+            ASSERT_LT(penetration(sheet, character.ghost), 6e-4) << "at " << t;
+            ASSERT_LT(sheet.shell().velocities().colwise().norm().maxCoeff(), 3.0 * speed + 6.0) << "at " << t;
+        }
+        EXPECT_LE(scene.shells->lastStep().unsettledSteps, 2);
+        EXPECT_EQ(scene.shells->lastStep().passedSteps, 0);
+    }
+};
+
+TEST_P(WalkingCharacter, GoesThroughACurtain) {
+    TriangleMesh mesh = squareSheet(1.2, 20);
+    mesh.positions.row(1) = mesh.positions.row(2).array() + 1.3;
+    mesh.positions.row(2).setZero();
+    auto& curtain = scene.shells->add(mesh, materials::cotton(), {.friction = 0.5});
+    for (int i = 0; i < curtain.vertexCount(); ++i)
+        if (curtain.shell().positions()(1, i) > 1.89) curtain.pin(i);
+    Character character(scene.world, -1.0);
+    run(character, curtain, 0.2, 2.2);
+    EXPECT_GT(character.z(), 0.5);
+}
+
+TEST_P(WalkingCharacter, JumpsUnderACloth) {
+    auto& cloth = scene.shells->add(squareSheet(1.2, 20), materials::cotton(), {.friction = 0.5});
+    place(cloth, {0.01, 1.55, 0.02});
+    Character character(scene.world, 0.0);
+    run(character, cloth, 1.0, 2.0, 1.5);
+}
+INSTANTIATE_TEST_SUITE_P(Speeds, WalkingCharacter,
+                         ::testing::Combine(::testing::Values(1.5, 4.0), ::testing::Values(60, 240)));
+
+/// Sleep and waking go by the ghost's poses.
+TEST(Character, WakesTheClothThatSleepsOnIt) {
+    BulletScene scene;
+    scene.addBox(btVector3(20, 1, 20), 0.0, btVector3(0, -1, 0));
+    Character character(scene.world, 0.0);
+    auto& cloth = scene.shells->add(squareSheet(0.2, 8), materials::cotton(), {.friction = 0.5});
+    place(cloth, {0, 1.52, 0});
+    for (int i = 0; i < 60 * 20 && !cloth.isAsleep(); ++i) scene.step(kStep);
+    ASSERT_TRUE(cloth.isAsleep());
+    EXPECT_TRUE(character.ghost.isActive());
+    character.walk(2.0 * kStep);
+    for (int i = 0; i < 30; ++i) {
+        scene.step(kStep);
+        EXPECT_FALSE(cloth.isAsleep());
+        EXPECT_LT(penetration(cloth, character.ghost), 5e-4);
+    }
+}
 
 /// Under a box, as a vehicle's.
 struct Springs : btActionInterface {
