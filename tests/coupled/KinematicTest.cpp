@@ -132,6 +132,31 @@ INSTANTIATE_TEST_SUITE_P(Steps, KinematicPlate,
                          ::testing::Combine(::testing::Values(kStep, kStep / 4), ::testing::Values(1, 4)));
 
 /// What a sheet gets is what it gives, also where that is known only when the step is over.
+/// What lies on the carpet, speed of the board [m/s].
+class LiftedCarpet : public ::testing::TestWithParam<std::tuple<std::string, double>> {};
+
+TEST_P(LiftedCarpet, LiesOnTheBoard) {
+    const auto [load, speed] = GetParam();
+    BulletScene scene;
+    auto& board = scene.addBox(btVector3(btScalar(0.5), btScalar(0.05), btScalar(0.5)), 0, btVector3(0, 0, 0));
+    makeKinematic(board);
+    auto& carpet = scene.shells->add(squareSheet(1.2, 16), materials::cotton(), {.friction = 0.5});
+    place(carpet, {0.01, 0.051, 0.02});
+    const btVector3 at(btScalar(0.02), btScalar(0.152), btScalar(0.03));
+    if (load == "ball") scene.addSphere(0.1, 0.3, at);
+    if (load == "box") scene.addBox(btVector3(btScalar(0.1), btScalar(0.1), btScalar(0.1)), 0.3, at);
+    for (int i = 0; i < 90; ++i) {
+        btTransform pose = btTransform::getIdentity();
+        pose.setOrigin(btVector3(0, btScalar(speed * kStep * std::clamp(i - 30, 0, 30)), 0));
+        board.setWorldTransform(pose);
+        scene.step(kStep);
+        EXPECT_LT(penetration(carpet, board), 1e-3) << "step " << i;
+    }
+}
+INSTANTIATE_TEST_SUITE_P(Loads, LiftedCarpet,
+                         ::testing::Combine(::testing::Values("none", "ball", "box"),
+                                            ::testing::Values(0.5, 1.0, 3.0)));
+
 TEST(Kinematic, TheLedgerAddsUp) {
     Scene<> scene(0.0);
     auto& ball = scene.addSphere(0.2, 0, btVector3(0, btScalar(-0.25), 0));

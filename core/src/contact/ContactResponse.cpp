@@ -824,17 +824,16 @@ void ContactResponse::letGo(Touch& touch) const {
 bool ContactResponse::releasePulling(int round) {
     constexpr double kMuch = 0.3;  // of the largest impulse
     const bool isLater = isQuick() && round > 0;
-    const bool isWithoutBodies = !hasFreeBodies();
     bool changed = false;
     double most = 0.0;
     for (const Touch& touch : m_touches) most = std::max(most, touch.pressing);
     for (Touch& touch : m_touches) {
         if (!touch.active) continue;
         const double pull = isLater ? kMuch : touch.isPinched ? kAmongWalls.pull : m_care.pull;
-        // In doubt a wall holds: what is released last may end inside it. One that moves would drag the shell along,
-        // and a light body would feel it.
-        const bool isStill = isWithoutBodies && carriedOf(touch).isZero(0.0);
-        const bool mayGo = touch.changes < kMostChanges - isStill && !(isStill && isLast(round + 1));
+        // In doubt a wall holds: what is released last may end inside it. One that goes away would drag the shell
+        // along.
+        const bool mayHold = touch.dynamicBody < 0 && carriedOf(touch).dot(touch.contact.normal) >= 0.0;
+        const bool mayGo = touch.changes < kMostChanges - mayHold && !(mayHold && isLast(round + 1));
         if (touch.normalImpulse < -pull * most && !touch.jammed && mayGo) {
             letGo(touch);
             changed = true;
