@@ -23,12 +23,10 @@ double deepestIn(const Bodies& bodies, const ShellBody& shell) {
 /// Speed that the user gives a body [m/s], steps a second.
 class KickedBall : public ::testing::TestWithParam<std::tuple<double, int>> {};
 
-/// In steps of 1/240 s contacts of one start in three do not settle in the step of the kick.
 TEST_P(KickedBall, TakesTheClothOnItAlong) {
     constexpr int kStarts = 4;
     const auto [speed, stepsASecond] = GetParam();
     const double h = 1.0 / stepsASecond;
-    double sum = 0.0;
     for (int start = 0; start < kStarts; ++start) {
         BulletScene scene;
         scene.addFloor();
@@ -45,12 +43,8 @@ TEST_P(KickedBall, TakesTheClothOnItAlong) {
             deepest = std::max(deepest, deepestIn(bodies, cloth));
             EXPECT_LT(cloth.shell().velocities().colwise().norm().maxCoeff(), 2.0 * speed + 2.0) << "step " << i;
         }
-        if (stepsASecond == 60) {
-            EXPECT_LT(deepest, 5e-4) << "start " << start;
-        }
-        sum += deepest;
+        EXPECT_LT(deepest, 5e-4) << "start " << start;
     }
-    EXPECT_LT(sum / kStarts, 0.25 * speed * h);
 }
 INSTANTIATE_TEST_SUITE_P(Speeds, KickedBall,
                          ::testing::Combine(::testing::Values(2.0, 5.0, 10.0), ::testing::Values(60, 240)));

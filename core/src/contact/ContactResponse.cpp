@@ -730,7 +730,9 @@ bool ContactResponse::update(const CoupledSystem& system, const IslandVelocities
     const bool entered = !released && checkEnd(solved, y, round);
     const bool bounced = !released && !entered && bounce(solved);
     // Friction follows the normal impulses only when these have settled: lagged behind a passing one it runs away.
-    const bool slid = !released && !entered && !bounced && updateFriction(system);
+    // What it changes must settle too: in the second half of the rounds it stays as it is.
+    const bool isTime = 2 * round < m_care.rounds;
+    const bool slid = !released && !entered && !bounced && isTime && updateFriction(system);
     if (released || entered || bounced) relaxDamping();
     const bool changed = released || entered || bounced || slid;
     if (changed && isLast(round + 1)) dropExcessFriction();
