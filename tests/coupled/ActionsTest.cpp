@@ -1,6 +1,7 @@
-// Other actions of a world: character controllers, which move ghost objects, and springs as of a vehicle.
+// Other actions of a world: character controllers, which move ghost objects, vehicles, and springs.
 #include <BulletCollision/CollisionDispatch/btGhostObject.h>
 #include <BulletDynamics/Character/btKinematicCharacterController.h>
+#include <BulletDynamics/Vehicle/btRaycastVehicle.h>
 #include <btBulletDynamicsCommon.h>
 #include <gtest/gtest.h>
 
@@ -131,6 +132,56 @@ TEST(Springs, HoldUpABoxUnderACloth) {
     EXPECT_EQ(scene.shells->lastStep().unsettledSteps, 0);
     scene.world.removeAction(&springs);
 }
+
+/// A chassis of 60 cm x 1 m on four springs with wheels.
+struct Vehicle {
+    btDynamicsWorld& world;
+    btRaycastVehicle::btVehicleTuning tuning;
+    btDefaultVehicleRaycaster rays{&world};
+    btRaycastVehicle vehicle;
+
+    Vehicle(btDynamicsWorld& in, btRigidBody& chassis) : world(in), vehicle(tuning, &chassis, &rays) {
+        chassis.setActivationState(DISABLE_DEACTIVATION);
+        vehicle.setCoordinateSystem(0, 1, 2);
+        for (const double z : {-0.4, 0.4})
+            for (const double x : {-0.25, 0.25}) {
+                btWheelInfo& wheel =
+                    vehicle.addWheel(btVector3(btScalar(x), 0, btScalar(z)), btVector3(0, -1, 0), btVector3(-1, 0, 0),
+                                     btScalar(0.25), btScalar(0.15), tuning, z > 0.0);
+                wheel.m_suspensionStiffness = 40;
+                wheel.m_wheelsDampingRelaxation = 3;
+                wheel.m_wheelsDampingCompression = 4;
+                wheel.m_frictionSlip = 2;
+                wheel.m_rollInfluence = btScalar(0.1);
+            }
+        world.addAction(&vehicle);
+    }
+    ~Vehicle() { world.removeAction(&vehicle); }
+    void drive(double force, double steering) {
+        for (const int rear : {0, 1}) vehicle.applyEngineForce(btScalar(force), rear);
+        for (const int front : {2, 3}) vehicle.setSteeringValue(btScalar(steering), front);
+    }
+};
+
+/// Steering [rad]. The cloth flies over the floor at up to 12 m/s, and sees it from afar.
+class DrivenVehicle : public ::testing::TestWithParam<double> {};
+
+TEST_P(DrivenVehicle, KeepsTheClothOnItOut) {
+    BulletScene scene;
+    scene.addFloor();
+    auto& chassis = scene.addBox(btVector3(btScalar(0.3), btScalar(0.15), btScalar(0.5)), 100.0, btVector3(0, 0.5, 0));
+    Vehicle vehicle(scene.world, chassis);
+    auto& cloth = scene.shells->add(squareSheet(1.2, 16), materials::cotton(), {.friction = 0.5});
+    place(cloth, {0.01, 0.75, 0.02});
+    for (int i = 0; i < 240; ++i) {
+        if (i > 60) vehicle.drive(200.0, GetParam());
+        scene.step(kStep);
+        EXPECT_LT(penetration(cloth, chassis), 5e-4) << "step " << i;
+    }
+    EXPECT_LE(scene.shells->lastStep().unsettledSteps, 4);
+    EXPECT_GT(chassis.getLinearVelocity().length(), 5.0);
+}
+INSTANTIATE_TEST_SUITE_P(Steering, DrivenVehicle, ::testing::Values(0.0, 0.3));
 
 /// Counts its calls, and looks where the shells are.
 struct Witness : btActionInterface {

@@ -170,11 +170,12 @@ int ContactResponse::touchAtVertex(const Contact& contact, int corner) const {
     return known == m_index.end() ? -1 : known->second;
 }
 
-/// Whether a vertex is near some other body that does not touch it.
+/// Whether a vertex is within an edge of some other body that does not touch it. What is fast sees others from afar.
 bool ContactResponse::isNearOthers(int vertex, int body) const {
     return std::any_of(m_touches.begin(), m_touches.end(), [&](const Touch& touch) {
-        return touch.contact.isVertex() && !touch.active && touch.contact.body != body &&
-               globalVertex(touch.contact, 0) == vertex;
+        const Contact& other = touch.contact;
+        return other.isVertex() && !touch.active && other.body != body && other.gap < m_edge[other.shell] &&
+               globalVertex(other, 0) == vertex;
     });
 }
 
