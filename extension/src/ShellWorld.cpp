@@ -130,6 +130,7 @@ struct Push {
 
 struct ShellWorld::Impl {
     std::pmr::unsynchronized_pool_resource memory;  ///< what a step gives back, the next one takes
+    explicit Impl(ShellWorld& shells) : turn(shells) {}
     TurnToAct turn;
     ShellContacts::Memory contactMemory;
     Obstacles obstacles;
@@ -154,7 +155,7 @@ struct ShellWorld::Impl {
     std::unique_ptr<WorkerTeam> team;  ///< none: one thread
 };
 
-ShellWorld::ShellWorld(btDynamicsWorld& world) : m_world(world), m_impl(std::make_unique<Impl>()) {
+ShellWorld::ShellWorld(btDynamicsWorld& world) : m_world(world), m_impl(std::make_unique<Impl>(*this)) {
     if (m_world.getWorldType() == BT_SIMPLE_DYNAMICS_WORLD)
         throw std::invalid_argument("ShellWorld: a btSimpleDynamicsWorld runs no actions, so shells would never move");
     m_impl->obstacles.setGravityIsNoForce(m_world.getWorldType() == BT_DEFORMABLE_MULTIBODY_DYNAMICS_WORLD);
@@ -232,7 +233,7 @@ std::vector<std::string> ShellWorld::takeWarnings() {
 /// then the next solve looks at this configuration, and its impulses enter Bullet's next solve. Shells among kinematic
 /// bodies have that solve when these have moved.
 void ShellWorld::updateAction(btCollisionWorld* world, btScalar h) {
-    if (!m_impl->turn.isLast(m_world, *this)) return;
+    if (!m_impl->turn.isLast(m_world)) return;
     if (!m_impl->checks.isLength(h)) {
         ++m_report.rejectedSteps;
         return;
