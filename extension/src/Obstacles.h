@@ -101,9 +101,11 @@ inline bool standsStill(const btCollisionObject& object) {
     return object.isStaticObject() && !object.isKinematicObject() && !isGhost;
 }
 
-/// Whether its user alone knows how it moves, and no shell could push it.
+/// Whether its user alone knows how it moves, and no shell could push it. (Soft bodies have no shape that shells
+/// touch.)
 inline bool isLed(const btCollisionObject& object) {
-    return !mayBePushed(object) && !standsStill(object);
+    const bool isSoft = object.getInternalType() == btCollisionObject::CO_SOFT_BODY;
+    return !mayBePushed(object) && !standsStill(object) && !isSoft;
 }
 
 /// Whether some of the objects are led and the others stand still. `objectOf`: the btCollisionObject of an entry.

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "Obstacles.h"
 #include "support/BulletScene.h"
 
 namespace jacket::bullet::testing {
@@ -246,6 +247,40 @@ TEST(ShellWorld, WarnsOnceOfAShapeItCannotTouch) {
     ASSERT_EQ(warnings.size(), 1u);
     EXPECT_NE(warnings[0].find("not supported yet"), std::string::npos) << warnings[0];
     EXPECT_TRUE(scene.shells->takeWarnings().empty());
+}
+
+/// By who moves them.
+TEST(Obstacles, AreToldApart) {
+    struct Object : btCollisionObject {
+        Object(int type, int flags) {
+            m_internalType = type;
+            setCollisionFlags(flags);
+        }
+    };
+    constexpr int kPlain = btCollisionObject::CO_COLLISION_OBJECT, kBody = btCollisionObject::CO_RIGID_BODY,
+                  kGhost = btCollisionObject::CO_GHOST_OBJECT, kSoft = btCollisionObject::CO_SOFT_BODY,
+                  kLink = btCollisionObject::CO_FEATHERSTONE_LINK;
+    constexpr int kStatic = btCollisionObject::CF_STATIC_OBJECT, kKinematic = btCollisionObject::CF_KINEMATIC_OBJECT,
+                  kCharacter = btCollisionObject::CF_CHARACTER_OBJECT;
+    const struct {
+        int type, flags;
+        bool mayBePushed, standsStill, isLed;
+    } kinds[] = {{kBody, 0, true, false, false},
+                 {kLink, 0, true, false, false},
+                 {kBody, kStatic, false, true, false},
+                 {kPlain, kStatic, false, true, false},
+                 {kBody, kStatic | kKinematic, false, false, true},
+                 {kBody, kKinematic, false, false, true},
+                 {kPlain, 0, false, false, true},
+                 {kGhost, kCharacter, false, false, true},
+                 {kGhost, kStatic, false, false, true},
+                 {kSoft, 0, false, false, false}};
+    for (const auto& kind : kinds) {
+        const Object object(kind.type, kind.flags);
+        EXPECT_EQ(mayBePushed(object), kind.mayBePushed) << kind.type << ", " << kind.flags;
+        EXPECT_EQ(standsStill(object), kind.standsStill) << kind.type << ", " << kind.flags;
+        EXPECT_EQ(isLed(object), kind.isLed) << kind.type << ", " << kind.flags;
+    }
 }
 
 }  // namespace
