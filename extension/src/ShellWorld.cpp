@@ -129,8 +129,8 @@ struct Push {
 };
 
 struct ShellWorld::Impl {
-    std::pmr::unsynchronized_pool_resource memory;  ///< what a step gives back, the next one takes
     explicit Impl(ShellWorld& shells) : turn(shells) {}
+    std::pmr::unsynchronized_pool_resource memory;  ///< what a step gives back, the next one takes
     TurnToAct turn;
     ShellContacts::Memory contactMemory;
     Obstacles obstacles;

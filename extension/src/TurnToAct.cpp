@@ -56,7 +56,10 @@ bool areOthersBehind(const Actions::List& actions, int place) {
 void closeFormerPlaces(Actions::List& actions) {
     for (int i = 0; i < actions.size();) {
         const bool isFormer = areShells(actions[i]) && findFrom(actions, i + 1, actions[i]) < actions.size();
-        isFormer ? erase(actions, i) : void(++i);
+        if (isFormer)
+            erase(actions, i);
+        else
+            ++i;
     }
 }
 

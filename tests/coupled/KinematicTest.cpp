@@ -131,7 +131,6 @@ TEST_P(KinematicPlate, LiftsASheetThatSleepsOnIt) {
 INSTANTIATE_TEST_SUITE_P(Steps, KinematicPlate,
                          ::testing::Combine(::testing::Values(kStep, kStep / 4), ::testing::Values(1, 4)));
 
-/// What a sheet gets is what it gives, also where that is known only when the step is over.
 /// What lies on the carpet, speed of the board [m/s].
 class LiftedCarpet : public ::testing::TestWithParam<std::tuple<std::string, double>> {};
 
@@ -157,6 +156,7 @@ INSTANTIATE_TEST_SUITE_P(Loads, LiftedCarpet,
                          ::testing::Combine(::testing::Values("none", "ball", "box"),
                                             ::testing::Values(0.5, 1.0, 3.0)));
 
+/// What a sheet gets is what it gives, also where that is known only when the step is over.
 TEST(Kinematic, TheLedgerAddsUp) {
     Scene<> scene(0.0);
     auto& ball = scene.addSphere(0.2, 0, btVector3(0, btScalar(-0.25), 0));

@@ -832,8 +832,7 @@ bool ContactResponse::releasePulling(int round) {
     for (Touch& touch : m_touches) {
         if (!touch.active) continue;
         const double pull = isLater ? kMuch : touch.isPinched ? kAmongWalls.pull : m_care.pull;
-        // In doubt a wall holds: what is released last may end inside it. One that goes away would drag the shell
-        // along.
+        // In doubt a wall holds, for what is released last may end inside it, unless it goes away and drags the shell.
         const bool mayHold = touch.dynamicBody < 0 && carriedOf(touch).dot(touch.contact.normal) >= 0.0;
         const bool mayGo = touch.changes < kMostChanges - mayHold && !(mayHold && isLast(round + 1));
         if (touch.normalImpulse < -pull * most && !touch.jammed && mayGo) {
