@@ -172,18 +172,23 @@ void ShellContacts::markOutside(const Query& query, const ConvexPiece& piece) {
     });
 }
 
+/// The sheet's unit normal at a vertex, in the body's frame.
+Vec3 ShellContacts::sheetNormal(const Query& query, int vertex) {
+    const HalfEdgeMesh& mesh = query.shellBody.shell().mesh();
+    Vec3 normal = Vec3::Zero();
+    for (const int t : mesh.trianglesAround(vertex)) {
+        const auto corners = mesh.triangles().col(t);
+        const Vec3 a = query.x.col(corners[0]), b = query.x.col(corners[1]), c = query.x.col(corners[2]);
+        normal += (b - a).cross(c - a);
+    }
+    return (query.frame.linear().transpose() * normal).stableNormalized();
+}
+
 /// A vertex that is put right on a body may lie on an edge of it, or a corner, where the nearest point's normal is any
 /// of many. That of the sheet says on which side of the body it lies. All in the body's frame.
 SurfacePoint ShellContacts::besideSheet(const Query& query, const ConvexPiece& piece, int vertex,
                                         const SurfacePoint& surface) {
-    const Shell& shell = query.shellBody.shell();
-    Vec3 normal = Vec3::Zero();
-    for (const int t : shell.mesh().trianglesAround(vertex)) {
-        const auto corners = shell.mesh().triangles().col(t);
-        const Vec3 a = query.x.col(corners[0]), b = query.x.col(corners[1]), c = query.x.col(corners[2]);
-        normal += (b - a).cross(c - a);
-    }
-    normal = (query.frame.linear().transpose() * normal).stableNormalized();
+    const Vec3 normal = sheetNormal(query, vertex);
     SurfacePoint best = surface;
     double most = kSameSide;
     for (const Vec3& out : {normal, Vec3(-normal)}) {
@@ -195,17 +200,36 @@ SurfacePoint ShellContacts::besideSheet(const Query& query, const ConvexPiece& p
     return best;
 }
 
+/// Where a sheet is folded over a body's edge, all normals between those of its two sides hold it up there. With those
+/// of single triangles, or of the nearest point, a vertex that has come to the edge hangs from it like a hook: whatever
+/// pulls is borne there, and none of that goes on to what lies behind. So the normal turns from vertex to vertex, as a
+/// smooth sheet's does, as far as the body admits.
+void ShellContacts::turnAsSheetDoes(const Query& query, const ConvexPiece& piece, Vec3 normal, SurfacePoint& surface) {
+    if (normal.dot(surface.normal) < 0.0) normal = -normal;
+    if (normal.dot(surface.normal) > kSameSide) return;
+    const auto beside = piece.touch(Vec3(surface.point + query.thickness() * normal), 2.0 * query.thickness());
+    if (!beside || beside->distance <= 0.0 || beside->normal.dot(surface.normal) > kSameSide) return;
+    surface.distance *= beside->normal.dot(surface.normal);
+    surface.normal = beside->normal;
+}
+
 /// A convex body has one side, which is what its contacts are made with; of others that shows when all are known.
 void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
     const Frame toBody = query.frame.inverse(Eigen::Isometry);
+    const bool isLed = m_obstacles[query.body].body.prescribed;
+    const double near = query.thickness() + 0.1 * query.shellBody.shell().meanEdge();
     const auto find = [&](int begin, int end, auto& found) {
         for (int i = begin; i < end; ++i) {
             if (m_memory.outside[i]) continue;
             const Vec3 x = toBody * Vec3(query.x.col(i));
-            const auto surface = piece.touch(x, query.reachOf(i) + query.thickness());
+            auto surface = piece.touch(x, query.reachOf(i) + query.thickness());
             if (!surface) continue;
-            const bool isOnIt = std::abs(surface->distance) < kOnSurface * query.thickness();
-            append(found, {i, isOnIt ? besideSheet(query, piece, i, *surface) : *surface});
+            const double distance = std::abs(surface->distance);
+            if (distance < kOnSurface * query.thickness())
+                surface = besideSheet(query, piece, i, *surface);
+            else if (isLed && distance < near)
+                turnAsSheetDoes(query, piece, sheetNormal(query, i), *surface);
+            append(found, {i, *surface});
         }
     };
     const auto use = [&](const Memory::Candidate& found) {
@@ -220,14 +244,21 @@ void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
 void ShellContacts::findFaces(Query& query, const ConvexPiece& piece) {
     const HalfEdgeMesh& mesh = query.shellBody.shell().mesh();
     const Frame toBody = query.frame.inverse(Eigen::Isometry);
+    const bool isLed = m_obstacles[query.body].body.prescribed;
     const auto find = [&](int begin, int end, auto& found) {
         for (int t = begin; t < end; ++t) {
             const auto corners = mesh.triangles().col(t);
             if (m_memory.outside[corners[0]] & m_memory.outside[corners[1]] & m_memory.outside[corners[2]]) continue;
             Mat3 triangle;
             for (int a = 0; a < 3; ++a) triangle.col(a) = toBody * Vec3(query.x.col(corners[a]));
-            const auto touch = piece.touch(triangle, query.faceReach + query.thickness());
-            if (touch) append(found, {t, *touch});
+            auto touch = piece.touch(triangle, query.faceReach + query.thickness());
+            if (!touch) continue;
+            if (isLed) {
+                Vec3 normal = Vec3::Zero();
+                for (int a = 0; a < 3; ++a) normal += touch->weights[a] * sheetNormal(query, corners[a]);
+                turnAsSheetDoes(query, piece, normal.stableNormalized(), touch->surface);
+            }
+            append(found, {t, *touch});
         }
     };
     collect(query.teamFor(piece), mesh.triangleCount(), m_memory.foundFaces, find,

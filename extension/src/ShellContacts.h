@@ -47,8 +47,10 @@ class ShellContacts final : public ContactDetector {
                         const auto& use);
     void markOutside(const Query& query, const ConvexPiece& piece);
     void findVertices(Query& query, const ConvexPiece& piece);
+    static Vec3 sheetNormal(const Query& query, int vertex);
     static SurfacePoint besideSheet(const Query& query, const ConvexPiece& piece, int vertex,
                                     const SurfacePoint& surface);
+    static void turnAsSheetDoes(const Query& query, const ConvexPiece& piece, Vec3 normal, SurfacePoint& surface);
     void findFaces(Query& query, const ConvexPiece& piece);
     static void cover(std::unique_ptr<TrianglePatch>& patch, const ConcavePiece& piece, Bounds near, double margin);
     const TrianglePatch& patchOf(int pair, std::size_t concave, const Sweep& sweep);

@@ -65,6 +65,45 @@ TEST(CoarseSheetOnIncline, DoesAsCoulombSays) {
     }
 }
 
+/// A strip of cloth that hangs over the edge of a table by a part of its length. By Euler and Eytelwein's law of belts
+/// an edge passes on e^-(mu pi / 2) of what pulls at one side of it: where mu is 0.3, the strip slides from 0.32 on.
+/// Cells along it, step [s].
+class StripOverAnEdge : public ::testing::TestWithParam<std::tuple<int, double>> {
+  protected:
+    const int cells = std::get<0>(GetParam());
+    const double h = std::get<1>(GetParam());
+    Scene<> scene;
+    ShellBody* strip = nullptr;
+
+    void layOut(double hanging) {
+        scene.addBox(btVector3(1, btScalar(0.5), 1), 0.0, btVector3(-1, btScalar(-0.5), 0)).setFriction(1);
+        strip = &scene.shells->add(makeGrid({.size = {1.0, 0.4}, .cells = {cells, cells / 2}}), materials::cotton(),
+                                   {.friction = 0.3});
+        constexpr btScalar kGap = btScalar(1e-3);
+        std::vector<btVector3> x(strip->positions().begin(), strip->positions().end());
+        for (btVector3& p : x) {
+            const btScalar beyond = p.x() + btScalar(hanging - 0.5);
+            p = beyond > btScalar(1e-6) ? btVector3(kGap, -beyond, p.z()) : btVector3(beyond, kGap, p.z());
+        }
+        strip->setPositions(x);
+    }
+    double highest() const { return strip->shell().positions().row(1).maxCoeff(); }
+};
+
+TEST_P(StripOverAnEdge, SlidesOffWhereMostOfItHangs) {
+    layOut(0.75);
+    for (double t = 0.0; t < 3.0 && highest() > -0.1; t += h) scene.step(h);
+    EXPECT_LT(highest(), -0.1);
+}
+
+TEST_P(StripOverAnEdge, StaysWhereFrictionBearsWhatHangs) {
+    layOut(0.25);
+    scene.run(2.0, h);
+    EXPECT_NEAR(strip->shell().positions().row(1).minCoeff(), -0.25, 2e-3);
+}
+INSTANTIATE_TEST_SUITE_P(Grid, StripOverAnEdge,
+                         ::testing::Combine(::testing::Values(12, 24), ::testing::Values(1.0 / 60, 1.0 / 240)));
+
 /// A solid ball that rolls without slipping: a = 5/7 g sin. It lies on the sheet only, not on the plane below.
 /// Cells along the sheet's 1 m, whether all of it is pinned.
 class RollingBall : public ::testing::TestWithParam<std::tuple<int, bool>> {};
