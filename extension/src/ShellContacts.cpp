@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "ManifoldPoint.h"
 
@@ -12,6 +13,8 @@ namespace {
 
 constexpr double kSameSide = 0.97;   // cosine of the angle below which two normals at a vertex count as one
 constexpr double kOnSurface = 0.01;  // of the contact's thickness: what is nearer to a surface lies on it
+constexpr double kSamePoint = 0.1;   // of the thickness: what is nearer to a point of a surface is that point
+constexpr double kTurning = 0.1;     // of an edge: how far off a body's edges normals turn as the sheet does
 constexpr int kLeastToShare = 1000;  // vertices of a shell from which on threads pay
 constexpr int kAtATime = 1024;       // vertices or triangles that a thread takes
 
@@ -75,11 +78,16 @@ struct ShellContacts::Query {
     const double* ownReach;  ///< of each vertex, null: all have vertexReach
     bool isConvex;           ///< the obstacle is one piece
     std::vector<Contact>& contacts;
-    WorkerTeam* team;  ///< null: the shell is too small to be shared
+    WorkerTeam* team;   ///< null: the shell is too small to be shared
+    bool isPrescribed;  ///< the obstacle's motion
     WorkerTeam* teamFor(const ConvexPiece& piece) const { return piece.asksShape() ? nullptr : team; }
     double thickness() const { return shellBody.contactThickness(); }
     double reachOf(int vertex) const { return ownReach ? std::min(vertexReach, ownReach[vertex]) : vertexReach; }
     bool wantsFaces() const { return faceReach > -std::numeric_limits<double>::infinity(); }
+    /// Whether a vertex' normal turns as the sheet does at this distance, see turnAsSheetDoes().
+    bool turnsAt(double distance) const {
+        return isPrescribed && std::abs(distance) < thickness() + kTurning * shellBody.shell().meanEdge();
+    }
 };
 
 ShellContacts::ShellContacts(std::span<const ShellBody* const> shells, std::span<const Obstacle> obstacles,
@@ -120,7 +128,8 @@ void ShellContacts::find(const ContactPose& pose, double vertexReach, double fac
                     pose.vertexReach.empty() ? nullptr : pose.vertexReach[shell],
                     obstacle.shape->pieces.size() == 1 && obstacle.shape->concave.empty(),
                     contacts,
-                    m_shells[shell]->vertexCount() < kLeastToShare ? nullptr : m_team};
+                    m_shells[shell]->vertexCount() < kLeastToShare ? nullptr : m_team,
+                    obstacle.body.prescribed};
         for (const auto& piece : obstacle.shape->pieces) {
             markOutside(query, *piece);
             if (query.wantsFaces()) findFaces(query, *piece);
@@ -184,6 +193,14 @@ Vec3 ShellContacts::sheetNormal(const Query& query, int vertex) {
     return (query.frame.linear().transpose() * normal).stableNormalized();
 }
 
+/// The same at a point of a triangle, as if the sheet were smooth.
+Vec3 ShellContacts::sheetNormal(const Query& query, int triangle, const Vec3& weights) {
+    const auto corners = query.shellBody.shell().mesh().triangles().col(triangle);
+    Vec3 normal = Vec3::Zero();
+    for (int a = 0; a < 3; ++a) normal += weights[a] * sheetNormal(query, corners[a]);
+    return normal.stableNormalized();
+}
+
 /// A vertex that is put right on a body may lie on an edge of it, or a corner, where the nearest point's normal is any
 /// of many. That of the sheet says on which side of the body it lies. All in the body's frame.
 SurfacePoint ShellContacts::besideSheet(const Query& query, const ConvexPiece& piece, int vertex,
@@ -204,10 +221,10 @@ SurfacePoint ShellContacts::besideSheet(const Query& query, const ConvexPiece& p
 /// of single triangles, or of the nearest point, a vertex that has come to the edge hangs from it like a hook: whatever
 /// pulls is borne there, and none of that goes on to what lies behind. So the normal turns from vertex to vertex, as a
 /// smooth sheet's does, as far as the body admits.
-void ShellContacts::turnAsSheetDoes(const Query& query, const ConvexPiece& piece, Vec3 normal, SurfacePoint& surface) {
-    if (normal.dot(surface.normal) < 0.0) normal = -normal;
+void ShellContacts::turnAsSheetDoes(const Query& query, const auto& touchAt, const Vec3& sheet, SurfacePoint& surface) {
+    const Vec3 normal = sheet.dot(surface.normal) < 0.0 ? Vec3(-sheet) : sheet;
     if (normal.dot(surface.normal) > kSameSide) return;
-    const auto beside = piece.touch(Vec3(surface.point + query.thickness() * normal), 2.0 * query.thickness());
+    const auto beside = touchAt(Vec3(surface.point + query.thickness() * normal), 2.0 * query.thickness());
     if (!beside || beside->distance <= 0.0 || beside->normal.dot(surface.normal) > kSameSide) return;
     surface.distance *= beside->normal.dot(surface.normal);
     surface.normal = beside->normal;
@@ -216,19 +233,17 @@ void ShellContacts::turnAsSheetDoes(const Query& query, const ConvexPiece& piece
 /// A convex body has one side, which is what its contacts are made with; of others that shows when all are known.
 void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
     const Frame toBody = query.frame.inverse(Eigen::Isometry);
-    const bool isLed = m_obstacles[query.body].body.prescribed;
-    const double near = query.thickness() + 0.1 * query.shellBody.shell().meanEdge();
+    const auto touchAt = [&](const Vec3& p, double reach) { return piece.touch(p, reach); };
     const auto find = [&](int begin, int end, auto& found) {
         for (int i = begin; i < end; ++i) {
             if (m_memory.outside[i]) continue;
             const Vec3 x = toBody * Vec3(query.x.col(i));
             auto surface = piece.touch(x, query.reachOf(i) + query.thickness());
             if (!surface) continue;
-            const double distance = std::abs(surface->distance);
-            if (distance < kOnSurface * query.thickness())
+            if (std::abs(surface->distance) < kOnSurface * query.thickness())
                 surface = besideSheet(query, piece, i, *surface);
-            else if (isLed && distance < near)
-                turnAsSheetDoes(query, piece, sheetNormal(query, i), *surface);
+            else if (query.turnsAt(surface->distance))
+                turnAsSheetDoes(query, touchAt, sheetNormal(query, i), *surface);
             append(found, {i, *surface});
         }
     };
@@ -244,7 +259,7 @@ void ShellContacts::findVertices(Query& query, const ConvexPiece& piece) {
 void ShellContacts::findFaces(Query& query, const ConvexPiece& piece) {
     const HalfEdgeMesh& mesh = query.shellBody.shell().mesh();
     const Frame toBody = query.frame.inverse(Eigen::Isometry);
-    const bool isLed = m_obstacles[query.body].body.prescribed;
+    const auto touchAt = [&](const Vec3& p, double reach) { return piece.touch(p, reach); };
     const auto find = [&](int begin, int end, auto& found) {
         for (int t = begin; t < end; ++t) {
             const auto corners = mesh.triangles().col(t);
@@ -253,11 +268,8 @@ void ShellContacts::findFaces(Query& query, const ConvexPiece& piece) {
             for (int a = 0; a < 3; ++a) triangle.col(a) = toBody * Vec3(query.x.col(corners[a]));
             auto touch = piece.touch(triangle, query.faceReach + query.thickness());
             if (!touch) continue;
-            if (isLed) {
-                Vec3 normal = Vec3::Zero();
-                for (int a = 0; a < 3; ++a) normal += touch->weights[a] * sheetNormal(query, corners[a]);
-                turnAsSheetDoes(query, piece, normal.stableNormalized(), touch->surface);
-            }
+            if (query.isPrescribed)
+                turnAsSheetDoes(query, touchAt, sheetNormal(query, t, touch->weights), touch->surface);
             append(found, {t, *touch});
         }
     };
@@ -290,12 +302,25 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
     const auto place = [&](const SurfacePoint& s) -> SurfacePoint {
         return {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance};
     };
+    const Frame toPiece = piece.frame.inverse(Eigen::Isometry);
+    // The other side of a valley may be nearer to what lies beside a contact.
+    const auto besideAt = [&](const SurfacePoint& surface) {
+        return [&, at = surface.point](const Vec3& p, double within) -> std::optional<SurfacePoint> {
+            const auto nearest = patch->touchNearest(toPiece * p, within, 0.0);
+            if (!nearest || (nearest->point - at).norm() > kSamePoint * query.thickness()) return {};
+            return place(*nearest);
+        };
+    };
     const auto findVerticesIn = [&](int begin, int end, auto& found) {
         std::vector<SurfacePoint> touched;
         for (int i = begin; i < end; ++i) {
             touched.clear();
             patch->touch(Vec3(x.col(i)), query.reachOf(i) + query.thickness(), depth, touched);
-            for (const SurfacePoint& surface : touched) append(found, {i, place(surface)});
+            for (const SurfacePoint& surface : touched) {
+                append(found, {i, place(surface)});
+                if (query.turnsAt(surface.distance))
+                    turnAsSheetDoes(query, besideAt(surface), sheetNormal(query, i), found.back().surface);
+            }
         }
     };
     collect(query.team, query.shellBody.vertexCount(), m_memory.foundVertices, findVerticesIn,
@@ -315,7 +340,12 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
             }
             touched.clear();
             patch->touch(triangle, edges, faceReach, depth, touched);
-            for (const auto& [surface, weights] : touched) append(found, {t, {place(surface), weights}});
+            for (const auto& [surface, weights] : touched) {
+                append(found, {t, {place(surface), weights}});
+                if (query.isPrescribed)
+                    turnAsSheetDoes(query, besideAt(surface), sheetNormal(query, t, weights),
+                                    found.back().touch.surface);
+            }
         }
     };
     collect(query.team, mesh.triangleCount(), m_memory.foundFaces, findFacesIn,

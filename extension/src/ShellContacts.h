@@ -48,9 +48,10 @@ class ShellContacts final : public ContactDetector {
     void markOutside(const Query& query, const ConvexPiece& piece);
     void findVertices(Query& query, const ConvexPiece& piece);
     static Vec3 sheetNormal(const Query& query, int vertex);
+    static Vec3 sheetNormal(const Query& query, int triangle, const Vec3& weights);
     static SurfacePoint besideSheet(const Query& query, const ConvexPiece& piece, int vertex,
                                     const SurfacePoint& surface);
-    static void turnAsSheetDoes(const Query& query, const ConvexPiece& piece, Vec3 normal, SurfacePoint& surface);
+    static void turnAsSheetDoes(const Query& query, const auto& touchAt, const Vec3& sheet, SurfacePoint& surface);
     void findFaces(Query& query, const ConvexPiece& piece);
     static void cover(std::unique_ptr<TrianglePatch>& patch, const ConcavePiece& piece, Bounds near, double margin);
     const TrianglePatch& patchOf(int pair, std::size_t concave, const Sweep& sweep);
