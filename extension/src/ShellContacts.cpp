@@ -303,6 +303,8 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
         return {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance};
     };
     const Frame toPiece = piece.frame.inverse(Eigen::Isometry);
+    const CoupledBody& body = m_obstacles[query.body].body;
+    const bool isStill = body.prescribed && body.freeTwist.isZero(0.0);  // moving meshes get deeper into coarse sheets
     // The other side of a valley may be nearer to what lies beside a contact.
     const auto besideAt = [&](const SurfacePoint& surface) {
         return [&, at = surface.point](const Vec3& p, double within) -> std::optional<SurfacePoint> {
@@ -318,7 +320,7 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
             patch->touch(Vec3(x.col(i)), query.reachOf(i) + query.thickness(), depth, touched);
             for (const SurfacePoint& surface : touched) {
                 append(found, {i, place(surface)});
-                if (query.turnsAt(surface.distance))
+                if (isStill && query.turnsAt(surface.distance))
                     turnAsSheetDoes(query, besideAt(surface), sheetNormal(query, i), found.back().surface);
             }
         }
@@ -342,7 +344,7 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
             patch->touch(triangle, edges, faceReach, depth, touched);
             for (const auto& [surface, weights] : touched) {
                 append(found, {t, {place(surface), weights}});
-                if (query.isPrescribed)
+                if (isStill)
                     turnAsSheetDoes(query, besideAt(surface), sheetNormal(query, t, weights),
                                     found.back().touch.surface);
             }
