@@ -34,6 +34,18 @@ void append(std::vector<T>& list, const T& element) {
     list.push_back(element);
 }
 
+/// How a triangle asks about its edges: of two that share one only the second does.
+std::array<ShellEdge, 3> edgesOf(const HalfEdgeMesh& mesh, const Points& x, int triangle) {
+    std::array<ShellEdge, 3> edges{ShellEdge::kLeftOut, ShellEdge::kLeftOut, ShellEdge::kLeftOut};
+    for (int a = 0; a < 3; ++a) {
+        const int halfEdge = 3 * triangle + a, twin = mesh.twin(halfEdge);
+        if (twin < 0) edges[a] = ShellEdge::kBorder;
+        if (twin >= 0 && twin < halfEdge)
+            edges[a] = {ShellEdge::kShared, x.col(mesh.triangles()((twin + 2) % 3, twin / 3))};
+    }
+    return edges;
+}
+
 bool isAbove(const Vec3& point, const SurfacePoint& plane) {
     const Vec3 offset = point - plane.point;
     return plane.normal.dot(offset) > 1e-6 * offset.norm();
@@ -197,7 +209,8 @@ Vec3 ShellContacts::sheetNormal(const Query& query, int vertex) {
 Vec3 ShellContacts::sheetNormal(const Query& query, int triangle, const Vec3& weights) {
     const auto corners = query.shellBody.shell().mesh().triangles().col(triangle);
     Vec3 normal = Vec3::Zero();
-    for (int a = 0; a < 3; ++a) normal += weights[a] * sheetNormal(query, corners[a]);
+    for (int a = 0; a < 3; ++a)
+        if (weights[a] != 0.0) normal += weights[a] * sheetNormal(query, corners[a]);
     return normal.stableNormalized();
 }
 
@@ -295,16 +308,16 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
     // A vertex that has come from the front in this step, or stands no deeper than a triangle is wide, is pushed out.
     double& depth = m_depth[query.pair];
     if (depth == 0.0) depth = std::max(query.vertexReach, 0.5 * query.shellBody.shell().meanEdge());
-    const Points x = (piece.frame.inverse(Eigen::Isometry) * query.frame.inverse(Eigen::Isometry)) * query.x;
+    const Frame toPiece = piece.frame.inverse(Eigen::Isometry);
+    const Points x = (toPiece * query.frame.inverse(Eigen::Isometry)) * query.x;
     const double margin = std::max({reach, query.wantsFaces() ? faceReach : 0.0, depth});
     const Bounds near{x.rowwise().minCoeff().array() - margin, x.rowwise().maxCoeff().array() + margin};
     cover(patch, piece, near, margin);
     const auto place = [&](const SurfacePoint& s) -> SurfacePoint {
         return {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance};
     };
-    const Frame toPiece = piece.frame.inverse(Eigen::Isometry);
-    const CoupledBody& body = m_obstacles[query.body].body;
-    const bool isStill = body.prescribed && body.freeTwist.isZero(0.0);  // moving meshes get deeper into coarse sheets
+    // Moving meshes get deeper into coarse sheets.
+    const bool isStill = query.isPrescribed && m_obstacles[query.body].body.freeTwist.isZero(0.0);
     // The other side of a valley may be nearer to what lies beside a contact.
     const auto besideAt = [&](const SurfacePoint& surface) {
         return [&, at = surface.point](const Vec3& p, double within) -> std::optional<SurfacePoint> {
@@ -332,16 +345,9 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
         std::vector<TrianglePoint> touched;
         for (int t = begin; t < end; ++t) {
             Mat3 triangle;
-            std::array<ShellEdge, 3> edges{ShellEdge::kLeftOut, ShellEdge::kLeftOut, ShellEdge::kLeftOut};
-            for (int a = 0; a < 3; ++a) {
-                triangle.col(a) = x.col(mesh.triangles()(a, t));
-                const int twin = mesh.twin(3 * t + a);  // its triangle asks about the edge if it comes first
-                if (twin < 0) edges[a] = ShellEdge::kBorder;
-                if (twin >= 0 && twin < 3 * t + a)
-                    edges[a] = {ShellEdge::kShared, x.col(mesh.triangles()((twin + 2) % 3, twin / 3))};
-            }
+            for (int a = 0; a < 3; ++a) triangle.col(a) = x.col(mesh.triangles()(a, t));
             touched.clear();
-            patch->touch(triangle, edges, faceReach, depth, touched);
+            patch->touch(triangle, edgesOf(mesh, x, t), faceReach, depth, touched);
             for (const auto& [surface, weights] : touched) {
                 append(found, {t, {place(surface), weights}});
                 if (isStill)
