@@ -113,7 +113,7 @@ void CarriedVertices::bringAlong(ShellBody& body, const Vec3& gravity, double h)
     if (strainAlone(shell, true) <= kLittle * moving) return;
     const double before = shell.elasticEnergy(shell.positions());
     if (energyAfter(body, 0.0) <= before + kLittle * moving) return;
-    const std::optional<Points> way = wayOfAll(shell, gravity, h);
+    const std::optional<Points> way = wayOfAll(shell, h);
     if (way && energyAlong(body, *way) <= before + moving)
         follow(shell, *way);
     else
@@ -121,8 +121,9 @@ void CarriedVertices::bringAlong(ShellBody& body, const Vec3& gravity, double h)
 }
 
 /// How all of a shell follows what is tied to a body, by its inertia and its stiffness: as in a step from standing
-/// still in which that is led to its anchor. Velocities stay as they are. None if the solve came to nothing.
-std::optional<Points> CarriedVertices::wayOfAll(Shell& shell, const Vec3& gravity, double h) const {
+/// still in which that is led to its anchor. It does not fall in it as well, into what it lies on. Velocities stay as
+/// they are. None if the solve came to nothing.
+std::optional<Points> CarriedVertices::wayOfAll(Shell& shell, double h) const {
     std::vector<CoupledBody> leaders;
     std::vector<Anchor> led;
     for (const auto& [carried, by] : m_shifts) {
@@ -137,7 +138,7 @@ std::optional<Points> CarriedVertices::wayOfAll(Shell& shell, const Vec3& gravit
     Shell* const one = &shell;
     IslandSolver solver;  // a new one: what others have solved is no start for this
     const bool isFinite =
-        solver.solve({.h = h, .gravity = gravity, .shells = {&one, 1}, .bodies = leaders, .anchors = led}).finite;
+        solver.solve({.h = h, .gravity = Vec3::Zero(), .shells = {&one, 1}, .bodies = leaders, .anchors = led}).finite;
     const Points way = h * shell.velocities();
     shell.setVelocities(velocities);
     return isFinite ? std::optional(way) : std::nullopt;

@@ -50,7 +50,7 @@ class CarriedVertices {
     static double energyOfMotion(const Shell& shell, const Vec3& gravity, double h);
     static void moveAsOne(ShellBody& shell, std::vector<Shift>& shifts);
     void bringAlong(ShellBody& shell, const Vec3& gravity, double h);
-    std::optional<Points> wayOfAll(Shell& shell, const Vec3& gravity, double h) const;
+    std::optional<Points> wayOfAll(Shell& shell, double h) const;
     double energyAlong(ShellBody& shell, const Points& way) const;
     void follow(Shell& shell, const Points& way);
     double strainAlone(const Shell& shell, bool ofTied) const;
