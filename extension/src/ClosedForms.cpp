@@ -252,6 +252,20 @@ SurfacePoint CylinderForm::nearest(const Vec3& p) const {
     return onPlane(p, side * Vec3::UnitY(), beyondCap);
 }
 
+/// No translation out of a body is shorter than what takes out one point of the triangle, here the one nearest to the
+/// axis; and along its normal no point lies lower. No two points are nearer to each other than to the endless cylinder.
+std::optional<TrianglePoint> CylinderForm::sideOfTriangle(const Mat3& triangle) const {
+    Mat3 seenAlong = triangle;
+    seenAlong.row(1).setZero();
+    const Barycentric b = closestOnTriangle(Vec3::Zero(), seenAlong);
+    const double rho = b.point.norm(), distance = rho - radius, rounding = 1e-9 * (radius + rho);
+    if (!(rho > rounding)) return std::nullopt;
+    const Vec3 normal = b.point / rho, point = triangle * b.weights;
+    if (std::abs(point.y()) > halfHeight + std::min(0.0, distance)) return std::nullopt;
+    if ((normal.transpose() * triangle).minCoeff() < rho - rounding) return std::nullopt;
+    return touching({b.weights, point}, normal, distance);
+}
+
 Vec3 CylinderForm::support(const Vec3& direction) const {
     return radius * radialDirection(direction) + Vec3(0, direction.y() < 0 ? -halfHeight : halfHeight, 0);
 }

@@ -57,6 +57,9 @@ struct CylinderForm {
     double radius;      // [m]
     double halfHeight;  // [m]
     SurfacePoint nearest(const Vec3& p) const;
+    /// Where it is the round side that a triangle touches, by the triangle's nearest point to the axis; nothing where
+    /// an end may be nearer, or the axis meets the triangle.
+    std::optional<TrianglePoint> sideOfTriangle(const Mat3& triangle) const;
     Vec3 support(const Vec3& direction) const;
     Vec3 halfExtents() const { return {radius, halfHeight, radius}; }
 };

@@ -126,7 +126,7 @@ struct ExactSolid {
     auto bounds(const Frame& frame) const { return boundsOf(form, frame); }
 };
 
-/// A closed form for points, libccd for triangles.
+/// A closed form for points, libccd for triangles, but for those that touch the round side of a cylinder.
 template <class Form>
 struct PointExactSolid {
     explicit PointExactSolid(Form form) : map(std::make_unique<FormMap<Form>>(std::move(form))), ccd(*map) {}
@@ -136,7 +136,12 @@ struct PointExactSolid {
         const SurfacePoint s = map->form().nearest(p);
         return s.distance <= reach ? std::optional(s) : std::nullopt;
     }
-    std::optional<TrianglePoint> touch(const Mat3& triangle, double reach) const { return ccd.touch(triangle, reach); }
+    std::optional<TrianglePoint> touch(const Mat3& triangle, double reach) const {
+        if constexpr (requires { map->form().sideOfTriangle(triangle); })
+            if (const auto side = map->form().sideOfTriangle(triangle))
+                return side->surface.distance <= reach ? side : std::nullopt;
+        return ccd.touch(triangle, reach);
+    }
     auto bounds(const Frame& frame) const { return boundsOf(*map, frame); }
 };
 

@@ -336,6 +336,43 @@ TEST(ClosedForms, NearestPointOfTriangles) {
     }
 }
 
+/// Wherever the side is said to be touched, libccd finds no shorter way; and it is said of all that sags into the side.
+TEST(ClosedForms, SidesOfCylindersAreTouchedAtTheLeastDistance) {
+    Random random(41);
+    int said = 0, sagging = 0;
+    for (int i = 0; i < 1000; ++i) {
+        const Specimen specimen = cylinder(random, 1);
+        const Vec3 half = Vec3(specimen.support(Vec3::UnitX()).x(), specimen.support(Vec3::UnitY()).y(), 0);
+        const CylinderForm form{half.x(), half.y()};
+        const auto ccd = makeCcdPiece(*specimen.shape, Frame::Identity());
+        std::vector<Mat3> triangles = randomTriangles(random, specimen.size, 10);
+        Mat3 onSide;
+        const double about = random.between(0, 6.28);
+        for (int k = 0; k < 3; ++k) {
+            const double angle = about + random.between(-0.3, 0.3);
+            onSide.col(k) = Vec3(form.radius * std::cos(angle), random.between(-0.5, 0.5) * form.halfHeight,
+                                 form.radius * std::sin(angle));
+        }
+        triangles.push_back(onSide);
+        for (const Mat3& triangle : triangles) {
+            const auto side = form.sideOfTriangle(triangle);
+            if (!side) continue;
+            ++said;
+            const double scale = specimen.size + triangle.cwiseAbs().maxCoeff();
+            expectSound(*side, triangle, specimen.support, specimen.size, 1e-8);
+            const auto other = ccd->touch(triangle, kReach);
+            ASSERT_TRUE(other);
+            EXPECT_GE(side->surface.distance, other->surface.distance - 1e-6 * scale) << triangle;
+            EXPECT_LE(side->surface.distance, 0.995 * std::min(0.0, other->surface.distance) +
+                                                  std::max(0.0, other->surface.distance) + 1e-6 * scale)
+                << triangle;
+        }
+        sagging += form.sideOfTriangle(onSide) ? 1 : 0;
+    }
+    EXPECT_GT(said, 2500);
+    EXPECT_GT(sagging, 950);
+}
+
 /// What is said to be beyond reach is; of what is by more than its sides, all is said to be.
 TEST(ClosedForms, TrianglesBeyondReachOfASphereAreFarther) {
     Random random(31);
