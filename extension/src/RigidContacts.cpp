@@ -82,6 +82,17 @@ double weightUnder(const btRigidBody& body, const btCollisionObject& other, doub
     return isHeld ? kSupport * linearMassOf(body) : linearMassOf(*under) / points;
 }
 
+/// Of a support on a body with that twist, along its row [N s].
+double impulseOf(const BodySupport& support, const Vec6& twist) {
+    return support.weight * (support.velocity - support.row.dot(twist));
+}
+
+/// By friction in Bullet's last solve, on the manifold's first body [N s].
+Vec3 frictionOf(const btManifoldPoint& point) {
+    return fromBullet(point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
+                      point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2);
+}
+
 /// Velocity of a body's point along a direction, from its twist.
 Vec6 rowOf(const Vec3& direction, const Vec3& at, const Vec3& centre) {
     return (Vec6() << direction, (at - centre).cross(direction)).finished();
@@ -167,6 +178,13 @@ std::span<btPersistentManifold* const> RigidContacts::manifoldsOf(const btCollis
     return known->second;
 }
 
+/// Where a contact is on a body that has moved since Bullet found it, unless that motion is looked at. A ball's does
+/// not turn with the ball.
+Vec3 RigidContacts::pointOn(const btRigidBody& body, const btVector3& found) const {
+    const Vec3 way = m_h * fromBullet(body.getLinearVelocity());
+    return m_hasMoved ? fromBullet(found) : Vec3(fromBullet(found) + way);
+}
+
 /// How fast the two are to part at least, where they bore load before [m/s]. What rests sinks in by a little, at one
 /// corner and another by turns: that is no push.
 double RigidContacts::pushOf(const btPersistentManifold& manifold, const btManifoldPoint& point) const {
@@ -217,6 +235,37 @@ void RigidContacts::addSupports(const btRigidBody& body, CoupledBody& coupled,
     if (m_hasMoved)  // what holds it has let it do that
         for (BodySupport& support : supports) support.velocity = support.row.dot(coupled.startTwist);
     holdBySupports(coupled, supports);
+    if (!m_hasMoved) addFriction(body, coupled);
+}
+
+/// As a load, which the shells do not change in the step; but by no more than Coulomb's law has it for what presses
+/// now: an impact may be over. What slides, it may stop but not turn around, and what nothing pushes any more it does
+/// not push either: it is the share that leaves the least sliding.
+void RigidContacts::addFriction(const btRigidBody& body, CoupledBody& coupled) const {
+    Vec6 impulse = Vec6::Zero();
+    double power = 0.0;  // of all of it, by the sliding that is left without it
+    double sum = 0.0, most = 0.0;
+    std::size_t support = 0;  // those of loaded points are the first
+    for (const btPersistentManifold* manifold : manifoldsOf(body)) {
+        const btCollisionObject& other = *otherThan(body, *manifold);
+        const bool first = manifold->getBody0() == &body;
+        for (int k = 0; k < manifold->getNumContacts(); ++k) {
+            const btManifoldPoint& point = manifold->getContactPoint(k);
+            if (!bears(point)) continue;
+            const Vec3 at = pointOn(body, first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
+            const Vec3 friction = (first ? 1.0 : -1.0) * frictionOf(point);
+            const Vec6 own = rowOf(friction, at, coupled.position);
+            impulse += own;
+            power += own.dot(coupled.freeTwist) - friction.dot(pointVelocity(other, at, 0.0));
+            const double pressing = areJoined(body, other) ? double(point.m_appliedImpulse)
+                                                           : impulseOf(coupled.supports[support++], coupled.freeTwist);
+            sum += friction.norm();
+            most += double(point.m_combinedFriction) * std::max(0.0, pressing);
+        }
+    }
+    if (power >= 0.0) return;
+    const Vec6 change = coupled.mass.ldlt().solve(impulse);
+    coupled.freeTwist += std::min({1.0, most / sum, -power / impulse.dot(change)}) * change;
 }
 
 void RigidContacts::addLoaded(const btRigidBody& body, const Vec3& centre, std::vector<BodySupport>& supports) const {
@@ -229,7 +278,7 @@ void RigidContacts::addLoaded(const btRigidBody& body, const Vec3& centre, std::
             const btManifoldPoint& point = manifold->getContactPoint(k);
             if (!bears(point)) continue;
             const Vec3 n = (first ? 1.0 : -1.0) * fromBullet(point.m_normalWorldOnB);
-            const Vec3 at = fromBullet(first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
+            const Vec3 at = pointOn(body, first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
             const double velocity = pointVelocity(other, at, m_h).dot(n) + pushOf(*manifold, point);
             supports.push_back({rowOf(n, at, centre), velocity, weight});
         }
@@ -304,9 +353,10 @@ void RigidContacts::addLoadedBetween(std::span<const Obstacle> obstacles, int ow
             const btManifoldPoint& point = manifold->getContactPoint(k);
             if (!bears(point) && point.getDistance() > btScalar(0)) continue;  // corners bear load by turns
             const Vec3 n = fromBullet(point.m_normalWorldOnB);
-            contacts.push_back({own, other->second, rowOf(n, fromBullet(point.getPositionWorldOnA()), first.position),
-                                rowOf(-n, fromBullet(point.getPositionWorldOnB()), second.position), weight,
-                                pushOf(*manifold, point)});
+            const Vec3 onFirst = pointOn(*btRigidBody::upcast(manifold->getBody0()), point.getPositionWorldOnA());
+            const Vec3 onSecond = pointOn(*btRigidBody::upcast(manifold->getBody1()), point.getPositionWorldOnB());
+            contacts.push_back({own, other->second, rowOf(n, onFirst, first.position),
+                                rowOf(-n, onSecond, second.position), weight, pushOf(*manifold, point)});
         }
     }
 }

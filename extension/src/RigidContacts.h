@@ -44,7 +44,8 @@ class RigidContacts {
     /// Contacts and joints between any of all these are `between`'s, and not `addSupports`' any more.
     std::pmr::vector<btCollisionObject*> join(std::span<btCollisionObject* const> bodies);
     /// What holds a body in the coming step besides the joined bodies: stiff terms of its mass. A body among that which
-    /// is not held itself is as heavy as it is. `supports`: what coupled.supports will show.
+    /// is not held itself is as heavy as it is. `supports`: what coupled.supports will show. Friction goes on as in
+    /// Bullet's last solve.
     void addSupports(const btRigidBody& body, CoupledBody& coupled, std::vector<BodySupport>& supports) const;
     /// Contacts among the joined bodies; indices of obstacles.
     std::pmr::vector<RigidContact> between(std::span<const Obstacle> obstacles) const;
@@ -59,12 +60,14 @@ class RigidContacts {
     void addLoaded(const btRigidBody& body, const Vec3& centre, std::vector<BodySupport>& supports) const;
     void addImpacts(const btRigidBody& body, const Vec3& centre, std::vector<BodySupport>& supports) const;
     void addJoints(const btRigidBody& body, std::vector<BodySupport>& supports) const;
+    void addFriction(const btRigidBody& body, CoupledBody& coupled) const;
     using ObstacleIndex = std::pmr::unordered_map<const btCollisionObject*, int>;
     void addLoadedBetween(std::span<const Obstacle> obstacles, int own, const ObstacleIndex& indexOf,
                           std::pmr::vector<RigidContact>& contacts) const;
     using Manifolds = std::pmr::vector<btPersistentManifold*>;
     std::span<btPersistentManifold* const> manifoldsOf(const btCollisionObject& object) const;
 
+    Vec3 pointOn(const btRigidBody& body, const btVector3& found) const;
     double pushOf(const btPersistentManifold& manifold, const btManifoldPoint& point) const;
 
     btDynamicsWorld& m_world;

@@ -73,6 +73,28 @@ TEST(Unforeseen, MomentumIsKeptAndTheLedgerCountsItOnce) {
     }
 }
 
+/// Friction of its floor is foreseen: else each of its steps would be solved once for a crate that slides, and once
+/// more.
+TEST(Unforeseen, IsNotWhatHoldsACrateOnASlope) {
+    BulletScene scene;
+    scene.world.setGravity(btVector3(btScalar(3.3), btScalar(-9.2), 0));
+    scene.addFloor().setFriction(1);
+    btRigidBody& crate =
+        scene.addBox(btVector3(btScalar(0.15), btScalar(0.15), btScalar(0.15)), 20.0, btVector3(0, btScalar(0.15), 0));
+    crate.setFriction(1);
+    auto& cloth = scene.shells->add(squareSheet(1.2, 24), materials::cotton(), {.friction = 0.4, .sleeping = false});
+    place(cloth, {0.0, 0.42, 0.0});
+    scene.run(1.0, kStep);
+    const btScalar before = crate.getCenterOfMassPosition().x();
+    int solves = 0;
+    for (int i = 0; i < 60; ++i) {
+        scene.step(kStep);
+        solves += scene.shells->lastStep().solves;
+    }
+    EXPECT_LT(solves, 60 * 4);
+    EXPECT_NEAR(double(crate.getCenterOfMassPosition().x()), double(before), 5e-4);
+}
+
 /// A jolt in every joint, which Bullet's iterations leave much of.
 TEST(Unforeseen, AFigureOnJointsHitsTheFloorUnderACloth) {
     for (const int start : {0, 1}) {
