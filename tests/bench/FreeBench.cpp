@@ -54,6 +54,9 @@ int main(int argc, char** argv) {
                                 ballAtCurtain("ball of 1 kg at a curtain", 1.0),
                                 fallingTogether("box of 1 kg on a falling cloth", 1.0),
                                 clothOnFallingBox("cloth on a box of 1 kg that lands", 1.0),
+                                crateOnSlope("cloth over a crate on a slope", 20.0),
+                                clothOnRoller("cloth over a cylinder that rolls", 2.0),
+                                tiedToBlocks("cloth tied to blocks of 1 kg", 1.0),
                                 clothOnBridge("cloth on a bridge of 9 planks", 0.1),
                                 clothOnRagdoll("cloth on a figure that falls")};
     const std::string material = argc > 1 ? argv[1] : "cotton", only = argc > 2 ? argv[2] : "";

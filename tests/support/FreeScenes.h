@@ -154,6 +154,47 @@ inline FreeScene clothOnFallingBox(const char* name, double mass) {
             }};
 }
 
+/// On a slope of 20 degrees, where the crate stands and the cloth may slide.
+inline FreeScene crateOnSlope(const char* name, double mass) {
+    return {name, 2.0, 6.0,
+            [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
+                constexpr btScalar half = btScalar(0.15);
+                scene.world.setGravity(btVector3(btScalar(3.36), btScalar(-9.22), 0));
+                bodies.push_back(&scene.addBox(btVector3(half, half, half), mass, btVector3(0, half, 0)));
+                bodies.back()->setFriction(2);  // with the floor's 1
+                return addSheet(scene, material, cells, Vec3(0.0, 0.42, 0.0) + aside);
+            }};
+}
+
+/// A cylinder that rolls at 2 m/s under a falling cloth.
+inline FreeScene clothOnRoller(const char* name, double mass) {
+    return {name, 1.0, 8.0,
+            [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
+                constexpr double radius = 0.12, speed = 2.0;
+                auto shape =
+                    std::make_unique<btCylinderShapeZ>(btVector3(btScalar(radius), btScalar(radius), btScalar(0.3)));
+                bodies.push_back(&scene.addBody(std::move(shape), mass, moved(-0.4, radius, 0.0, aside)));
+                bodies.back()->setLinearVelocity(btVector3(btScalar(speed), 0, 0));
+                bodies.back()->setAngularVelocity(btVector3(0, 0, btScalar(-speed / radius)));
+                return addSheet(scene, material, cells, {0.0, 2.0 * radius + 0.02, 0.0});
+            }};
+}
+
+/// A sheet on a floor that is tied to blocks by its corners, in the middle of their tops.
+inline FreeScene tiedToBlocks(const char* name, double mass) {
+    return {name, 3.0, 6.0,
+            [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
+                constexpr btScalar half = btScalar(0.05);
+                auto& sheet = addSheet(scene, material, cells, Vec3(0.0, 0.1, 0.0) + aside);
+                for (const int corner : {0, cells, (cells + 1) * cells, (cells + 1) * (cells + 1) - 1}) {
+                    const btVector3 at = sheet.positions()[corner] - btVector3(0, half, 0);
+                    bodies.push_back(&scene.addBox(btVector3(half, half, half), mass, at));
+                    sheet.anchor(corner, *bodies.back());
+                }
+                return sheet;
+            }};
+}
+
 /// Planks that hang on each other and, at both ends, on the world.
 inline FreeScene clothOnBridge(const char* name, double mass) {
     return {
