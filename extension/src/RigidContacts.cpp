@@ -238,6 +238,27 @@ void RigidContacts::addSupports(const btRigidBody& body, CoupledBody& coupled,
     if (!m_hasMoved) addFriction(body, coupled);
 }
 
+/// A contact of a body that bore load, as seen from the body.
+struct RigidContacts::LoadedPoint {
+    const btCollisionObject& other;
+    const btPersistentManifold& manifold;
+    const btManifoldPoint& point;
+    double side;  ///< 1: the body is the manifold's first one, -1: the second
+    Vec3 at;
+};
+
+void RigidContacts::forEachLoaded(const btRigidBody& body, const auto& use) const {
+    for (const btPersistentManifold* manifold : manifoldsOf(body)) {
+        const bool first = manifold->getBody0() == &body;
+        for (int k = 0; k < manifold->getNumContacts(); ++k) {
+            const btManifoldPoint& point = manifold->getContactPoint(k);
+            if (!bears(point)) continue;
+            const Vec3 at = pointOn(body, first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
+            use(LoadedPoint{*otherThan(body, *manifold), *manifold, point, first ? 1.0 : -1.0, at});
+        }
+    }
+}
+
 /// As a load, which the shells do not change in the step; but by no more than Coulomb's law has it for what presses
 /// now: an impact may be over. What slides, it may stop but not turn around, and what nothing pushes any more it does
 /// not push either: it is the share that leaves the least sliding.
@@ -246,43 +267,30 @@ void RigidContacts::addFriction(const btRigidBody& body, CoupledBody& coupled) c
     double power = 0.0;  // of all of it, by the sliding that is left without it
     double sum = 0.0, most = 0.0;
     std::size_t support = 0;  // those of loaded points are the first
-    for (const btPersistentManifold* manifold : manifoldsOf(body)) {
-        const btCollisionObject& other = *otherThan(body, *manifold);
-        const bool first = manifold->getBody0() == &body;
-        for (int k = 0; k < manifold->getNumContacts(); ++k) {
-            const btManifoldPoint& point = manifold->getContactPoint(k);
-            if (!bears(point)) continue;
-            const Vec3 at = pointOn(body, first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
-            const Vec3 friction = (first ? 1.0 : -1.0) * frictionOf(point);
-            const Vec6 own = rowOf(friction, at, coupled.position);
-            impulse += own;
-            power += own.dot(coupled.freeTwist) - friction.dot(pointVelocity(other, at, 0.0));
-            const double pressing = areJoined(body, other) ? double(point.m_appliedImpulse)
-                                                           : impulseOf(coupled.supports[support++], coupled.freeTwist);
-            sum += friction.norm();
-            most += double(point.m_combinedFriction) * std::max(0.0, pressing);
-        }
-    }
+    forEachLoaded(body, [&](const LoadedPoint& loaded) {
+        const auto& [other, manifold, point, side, at] = loaded;
+        const Vec3 friction = side * frictionOf(point);
+        const Vec6 own = rowOf(friction, at, coupled.position);
+        impulse += own;
+        power += own.dot(coupled.freeTwist) - friction.dot(pointVelocity(other, at, 0.0));
+        const double pressing = areJoined(body, other) ? double(point.m_appliedImpulse)
+                                                       : impulseOf(coupled.supports[support++], coupled.freeTwist);
+        sum += friction.norm();
+        most += double(point.m_combinedFriction) * std::max(0.0, pressing);
+    });
     if (power >= 0.0) return;
     const Vec6 change = coupled.mass.ldlt().solve(impulse);
     coupled.freeTwist += std::min({1.0, most / sum, -power / impulse.dot(change)}) * change;
 }
 
 void RigidContacts::addLoaded(const btRigidBody& body, const Vec3& centre, std::vector<BodySupport>& supports) const {
-    for (const btPersistentManifold* manifold : manifoldsOf(body)) {
-        const btCollisionObject& other = *otherThan(body, *manifold);
-        if (areJoined(body, other)) continue;
-        const bool first = manifold->getBody0() == &body;
-        const double weight = weightUnder(body, other, loadedPoints(*manifold));
-        for (int k = 0; k < manifold->getNumContacts(); ++k) {
-            const btManifoldPoint& point = manifold->getContactPoint(k);
-            if (!bears(point)) continue;
-            const Vec3 n = (first ? 1.0 : -1.0) * fromBullet(point.m_normalWorldOnB);
-            const Vec3 at = pointOn(body, first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
-            const double velocity = pointVelocity(other, at, m_h).dot(n) + pushOf(*manifold, point);
-            supports.push_back({rowOf(n, at, centre), velocity, weight});
-        }
-    }
+    forEachLoaded(body, [&](const LoadedPoint& loaded) {
+        const auto& [other, manifold, point, side, at] = loaded;
+        if (areJoined(body, other)) return;
+        const Vec3 n = side * fromBullet(point.m_normalWorldOnB);
+        const double velocity = pointVelocity(other, at, m_h).dot(n) + pushOf(manifold, point);
+        supports.push_back({rowOf(n, at, centre), velocity, weightUnder(body, other, loadedPoints(manifold))});
+    });
 }
 
 void RigidContacts::addImpacts(const btRigidBody& body, const Vec3& centre, std::vector<BodySupport>& supports) const {

@@ -57,6 +57,8 @@ class RigidContacts {
     void foresee(const btCollisionObject& body);
     void readJoints(const btCollisionObject& body);
     bool areJoined(const btCollisionObject& a, const btCollisionObject& b) const;
+    struct LoadedPoint;
+    void forEachLoaded(const btRigidBody& body, const auto& use) const;
     void addLoaded(const btRigidBody& body, const Vec3& centre, std::vector<BodySupport>& supports) const;
     void addImpacts(const btRigidBody& body, const Vec3& centre, std::vector<BodySupport>& supports) const;
     void addJoints(const btRigidBody& body, std::vector<BodySupport>& supports) const;

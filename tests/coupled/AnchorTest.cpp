@@ -8,7 +8,7 @@
 #include <numeric>
 #include <vector>
 
-#include "support/HardScenes.h"
+#include "support/FreeScenes.h"
 
 namespace jacket::bullet::testing {
 namespace {
@@ -256,15 +256,12 @@ TEST(Anchors, DentMetalByNoMoreThanTheFallWhereABodyLandsHard) {
 /// after them is not to push it in: that took hundreds of solves in most steps. In a few it may take as many still.
 TEST(Anchors, LeaveASheetLyingOnItsBodies) {
     constexpr int kCells = 12, kSteps = 90;
-    constexpr btScalar half = btScalar(0.05);
-    Scene<> scene;
+    BulletScene scene;
     scene.addFloor();
     auto& sheet = scene.shells->add(squareSheet(1, kCells), materials::cotton());
     place(sheet, {0.0, 0.1, 0.0});
-    for (const int corner : {0, kCells, (kCells + 1) * kCells, (kCells + 1) * (kCells + 1) - 1}) {
-        const btVector3 at = sheet.positions()[corner] - btVector3(0, half, 0);
-        sheet.anchor(corner, scene.addBox(btVector3(half, half, half), 1.0, at));
-    }
+    Bodies blocks;
+    free_scenes::tieToBlocks(scene, sheet, kCells, 1.0, blocks);
     std::vector<int> solves;
     for (int i = 0; i < kSteps; ++i) {
         scene.step(kStep);

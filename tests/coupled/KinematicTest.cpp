@@ -131,6 +131,12 @@ TEST_P(KinematicPlate, LiftsASheetThatSleepsOnIt) {
 INSTANTIATE_TEST_SUITE_P(Steps, KinematicPlate,
                          ::testing::Combine(::testing::Values(kStep, kStep / 4), ::testing::Values(1, 4)));
 
+/// Of an odd number of values.
+double medianOf(std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    return values[values.size() / 2];
+}
+
 /// What lies on the carpet, speed of the board [m/s].
 class LiftedCarpet : public ::testing::TestWithParam<std::tuple<std::string, double>> {
   protected:
@@ -162,8 +168,7 @@ TEST_P(LiftedCarpet, LiesOnTheBoard) {
     const auto [load, speed] = GetParam();
     std::vector<double> depths;
     for (const int start : {0, 1, 2, 3, 4}) depths.push_back(deepest(load, speed, start));
-    std::nth_element(depths.begin(), depths.begin() + 2, depths.end());
-    EXPECT_LT(depths[2], 5e-4);
+    EXPECT_LT(medianOf(depths), 5e-4);
 }
 INSTANTIATE_TEST_SUITE_P(Loads, LiftedCarpet,
                          ::testing::Combine(::testing::Values("none", "ball", "box"),
@@ -227,8 +232,7 @@ class KinematicCourse : public ::testing::TestWithParam<std::tuple<std::string, 
         for (int start = 0; start < 9; ++start)
             depths.push_back(
                 KinematicScene{materials::cotton(), course, pusher, cells, kStep, {1e-5 * start, 0, z}}.run().deepest);
-        std::sort(depths.begin(), depths.end());
-        return depths[4];
+        return medianOf(depths);
     }
 };
 

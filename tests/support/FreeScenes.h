@@ -161,7 +161,7 @@ inline FreeScene crateOnSlope(const char* name, double mass) {
                 constexpr btScalar half = btScalar(0.15);
                 scene.world.setGravity(btVector3(btScalar(3.36), btScalar(-9.22), 0));
                 bodies.push_back(&scene.addBox(btVector3(half, half, half), mass, btVector3(0, half, 0)));
-                bodies.back()->setFriction(2);  // with the floor's 1
+                bodies.back()->setFriction(2);  // times the floor's: 1
                 return addSheet(scene, material, cells, Vec3(0.0, 0.42, 0.0) + aside);
             }};
 }
@@ -180,17 +180,21 @@ inline FreeScene clothOnRoller(const char* name, double mass) {
             }};
 }
 
-/// A sheet on a floor that is tied to blocks by its corners, in the middle of their tops.
+/// Ties a sheet to blocks that stand under its corners, in the middle of their tops.
+inline void tieToBlocks(BulletScene& scene, ShellBody& sheet, int cells, double mass, Bodies& bodies) {
+    constexpr btScalar half = btScalar(0.05);
+    for (const int corner : {0, cells, (cells + 1) * cells, (cells + 1) * (cells + 1) - 1}) {
+        const btVector3 at = sheet.positions()[corner] - btVector3(0, half, 0);
+        bodies.push_back(&scene.addBox(btVector3(half, half, half), mass, at));
+        sheet.anchor(corner, *bodies.back());
+    }
+}
+
 inline FreeScene tiedToBlocks(const char* name, double mass) {
     return {name, 3.0, 6.0,
             [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
-                constexpr btScalar half = btScalar(0.05);
                 auto& sheet = addSheet(scene, material, cells, Vec3(0.0, 0.1, 0.0) + aside);
-                for (const int corner : {0, cells, (cells + 1) * cells, (cells + 1) * (cells + 1) - 1}) {
-                    const btVector3 at = sheet.positions()[corner] - btVector3(0, half, 0);
-                    bodies.push_back(&scene.addBox(btVector3(half, half, half), mass, at));
-                    sheet.anchor(corner, *bodies.back());
-                }
+                tieToBlocks(scene, sheet, cells, mass, bodies);
                 return sheet;
             }};
 }
