@@ -271,6 +271,23 @@ TEST(Anchors, LeaveASheetLyingOnItsBodies) {
     EXPECT_LT(solves[kSteps / 2], 20);
 }
 
+/// A ball around the middle of a sheet, which is tied to its centre: the middle is no contact that could be settled.
+TEST(Anchors, DoNotCollideWithTheirBodies) {
+    BulletScene scene;
+    auto& sheet = scene.shells->add(squareSheet(1, 6), materials::cotton());
+    for (const int corner : {0, 6, 42, 48}) sheet.pin(corner);
+    auto& ball = scene.addSphere(0.05, 0.5, sheet.positions()[kMiddle]);
+    sheet.anchor(kMiddle, ball);
+    for (int i = 0; i < 120; ++i) {
+        scene.step(kStep);
+        ASSERT_TRUE(scene.shells->lastStep().settled) << i;
+        ASSERT_LE(scene.shells->lastStep().solves, 8) << i;
+        for (const ContactImpulse& contact : sheet.contacts()) ASSERT_NE(contact.contact.vertices[0], kMiddle) << i;
+    }
+    EXPECT_LT((ball.getWorldTransform().getOrigin() - sheet.positions()[kMiddle]).length(),
+              bulletTolerance(1e-6, 1e-4));
+}
+
 /// A light box that is tied to a sheet far from it, and flies by: what the solve leaves over, times the lever, is a
 /// spin of many turns a second.
 TEST(Anchors, SpinNoLightBodyFarFromThem) {

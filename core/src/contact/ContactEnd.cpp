@@ -38,6 +38,7 @@ void ContactResponse::findAtEnd(const IslandVelocities& solved, const Points& y)
     m_found.clear();
     const double faceSlop = hasSurfaces() ? std::min(m_vertexSlop, m_faceSlop) : m_faceSlop;
     m_input.contacts->find({m_endPoses, m_endTwists, m_input.h}, -m_vertexSlop, -faceSlop, m_found);
+    dropTied();
     std::sort(m_found.begin(), m_found.end(), [](const Contact& a, const Contact& b) { return a.gap < b.gap; });
     dropPassed();
 }
@@ -56,6 +57,7 @@ ContactSweep ContactResponse::wayToEnd(std::span<const char> bodies) {
 void ContactResponse::sweepToEnd() {
     m_found.clear();
     m_input.contacts->sweep(wayToEnd(m_fast), m_found);
+    dropTied();
 }
 
 /// Not only of fast bodies: between the corners of a triangle larger than they are others go through it little by

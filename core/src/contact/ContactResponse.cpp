@@ -152,7 +152,12 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
         m_edge.push_back(shell.meanEdge());
         shortest = std::min(shortest, m_edge.back());
     }
-    for (const auto& anchor : input.anchors) m_held[m_offsets[anchor.shell] + anchor.vertex] = 1;
+    m_tied.clear();
+    for (const auto& anchor : input.anchors) {
+        const int vertex = m_offsets[anchor.shell] + anchor.vertex;
+        m_held[vertex] = 1;
+        m_tied.insert({vertex, anchor.body});
+    }
     findChords();
     m_bearsNoBody = false;
     if (!input.contacts) return;
@@ -211,6 +216,7 @@ void ContactResponse::findAtStart(double reach) {
     const auto find = [&](double faceReach) {
         m_found.clear();
         m_input.contacts->find({m_startPoses, m_still, 0.0, m_reachOf}, reach, faceReach, m_found);
+        dropTied();
     };
     m_found.clear();
     m_backed.clear();
@@ -224,6 +230,18 @@ void ContactResponse::findAtStart(double reach) {
     const bool isBesidePin = !areSurfaces && mayBeBacked();
     if (!areSurfaces && (isBesidePin || isAnyComing)) find(reach);
     if (areSurfaces || isBesidePin) findBacked();
+}
+
+/// Takes out of what was found the vertices that are anchored to the body that they touch, and what is nearly at one:
+/// they move as the body does, and no contact can lead them out of it.
+void ContactResponse::dropTied() {
+    if (m_tied.empty()) return;
+    std::erase_if(m_found, [&](const Contact& contact) {
+        double tied = 0.0;
+        for (int a = 0; a < 3; ++a)
+            if (m_tied.count({globalVertex(contact, a), contact.body}) > 0) tied += contact.weights[a];
+        return tied > 1.0 - kNearEdge;
+    });
 }
 
 bool ContactResponse::hasFreeBodies() const {

@@ -192,6 +192,7 @@ class ContactResponse {
     void findAtStart(double reach);
     void findRoomBesideFaces();
     void findComing();
+    void dropTied();
     bool mayBeBacked() const;
     void findBacked();
     bool isBacked(const Contact& contact) const;
@@ -287,6 +288,7 @@ class ContactResponse {
     std::vector<Contact> m_found;
     std::pmr::map<int, double> m_room{&m_pool};            ///< of vertices: see findRoomBesideFaces [m]
     std::pmr::set<std::pair<int, int>> m_backed{&m_pool};  ///< (vertex, free body): see findBacked
+    std::pmr::set<std::pair<int, int>> m_tied{&m_pool};    ///< (vertex, body): anchored to it
     std::pmr::map<int, Vec3> m_raised{
         &m_pool};  ///< by what their own contacts take vertices out of bodies in this round [m]
     std::pmr::set<int> m_claimed{&m_pool};    ///< vertices of the soft rows that this round has added
