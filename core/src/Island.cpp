@@ -161,8 +161,9 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
 
 /// Those at the start of the step, and y.
 void IslandSolver::Impl::beginContacts(const IslandInput& input, bool onlyStops) {
-    response.begin(input, {offsets, dynamicIndex, stepOf, isAnyFactored(), givesWay, mayBeShorter, onlyStops}, expected,
-                   y);
+    response.begin(input,
+                   {offsets, dynamicIndex, stepOf, isAnyFactored(), givesWay, mayBeShorter, partOfStep, onlyStops},
+                   expected, y);
     givesWay = givesWay || !response.hasContacts();
 }
 

@@ -253,22 +253,20 @@ TEST(Anchors, DentMetalByNoMoreThanTheFallWhereABodyLandsHard) {
 }
 
 /// A sheet on a floor that is tied to blocks by its corners, in the middle of their tops, lies on them. What leads it
-/// after them is not to push it in: that took hundreds of solves in most steps. In a few it may take as many still.
+/// after them is not to push it in, its tied vertices are not to be taken out of their own blocks, and what is to be
+/// taken out is to take the time of a step, not that of a part of one: some steps took two thousand solves.
 TEST(Anchors, LeaveASheetLyingOnItsBodies) {
-    constexpr int kCells = 12, kSteps = 90;
+    constexpr int kCells = 24, kSteps = 60;
     BulletScene scene;
     scene.addFloor();
-    auto& sheet = scene.shells->add(squareSheet(1, kCells), materials::cotton());
-    place(sheet, {0.0, 0.1, 0.0});
     Bodies blocks;
-    free_scenes::tieToBlocks(scene, sheet, kCells, 1.0, blocks);
-    std::vector<int> solves;
+    free_scenes::tiedToBlocks("tied", 1.0).make(scene, materials::cotton(), kCells, Vec3::Zero(), blocks);
+    int solves = 0;
     for (int i = 0; i < kSteps; ++i) {
         scene.step(kStep);
-        solves.push_back(scene.shells->lastStep().solves);
+        solves += scene.shells->lastStep().solves;
     }
-    std::nth_element(solves.begin(), solves.begin() + kSteps / 2, solves.end());
-    EXPECT_LT(solves[kSteps / 2], 20);
+    EXPECT_LT(solves, 30 * kSteps);
 }
 
 /// A ball around the middle of a sheet, which is tied to its centre: the middle is no contact that could be settled.

@@ -261,6 +261,12 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     return true;
 }
 
+/// Whether what stood inside the body at the start is taken out of it by and by. In the short time that is a part of a
+/// step a face that leaves at once would throw the shell, or the body.
+bool ContactResponse::leavesSlowly(const Contact& contact) const {
+    return isBacked(contact) || (m_partOfStep < 1.0 && !isLed(contact.body) && !contact.isVertex());
+}
+
 /// Sets what a contact where the end found it is to reach. `lacks`: see missing.
 void ContactResponse::aim(Touch& touch, double lacks, const IslandVelocities& solved) const {
     const Contact& contact = touch.contact;
@@ -268,9 +274,10 @@ void ContactResponse::aim(Touch& touch, double lacks, const IslandVelocities& so
     const double before = lacks - m_input.h * speed;
     double take = isBetweenBodies(touch) ? kAlteration * lacks : lacks;
     if (m_onlyStops) take = lacks - std::min(0.0, before);
-    if (isBacked(contact)) {  // from where it really is: each end of a body that lies aslant has its own depth
+    if (leavesSlowly(contact)) {  // from where it really is: each end of a body that lies aslant has its own depth
         const double start = before + touch.allowedGap;
-        take = lacks + touch.allowedGap - (start < 0.0 ? std::min(0.0, start + m_input.h * speedOutOf(-start)) : 0.0);
+        const double out = m_input.h * speedOutOf(-start, contact.body);
+        take = lacks + touch.allowedGap - (start < 0.0 ? std::min(0.0, start + out) : 0.0);
     }
     touch.allowedGap += lacks - take;
     touch.target = speed - take / m_input.h;

@@ -39,6 +39,7 @@ class ContactResponse {
         bool isAnyFactored;                    ///< some shell: completely
         bool givesWay;                         ///< false: pushOut would strain some shell
         bool mayBeShorter;                     ///< the step, if fast contacts do not settle soon
+        double partOfStep;                     ///< that is being solved, of one that is solved in parts
         bool onlyStops;  ///< solved velocities need only keep shells from going deeper than they are
     };
     /// Contacts at the start of the step, and the position alteration y of vertices that stand inside a body.
@@ -198,7 +199,10 @@ class ContactResponse {
     bool isBacked(const Contact& contact) const;
     bool hasSurfaces() const;
     bool isSurface(const Contact& contact) const;
-    double speedOutOf(double depth) const;
+    bool isLed(int body) const;
+    bool leavesSlowly(const Contact& contact) const;
+    double shareTakenBack(int body) const;
+    double speedOutOf(double depth, int body) const;
     void dropPassed();
     static bool isBeside(const Contact& contact, const Contact& face);
     double slopOf(const Contact& contact) const;
@@ -285,6 +289,7 @@ class ContactResponse {
     bool m_anyFast = false;
     std::vector<char> m_stiff;  ///< per shell: has pins and is stiff as a whole, beside free bodies
     bool m_onlyStops = false;   ///< see Numbering
+    double m_partOfStep = 1.0;  ///< see Numbering
     std::vector<Contact> m_found;
     std::pmr::map<int, double> m_room{&m_pool};            ///< of vertices: see findRoomBesideFaces [m]
     std::pmr::set<std::pair<int, int>> m_backed{&m_pool};  ///< (vertex, free body): see findBacked
