@@ -230,12 +230,13 @@ TEST(ClothOnAFallingBox, StaysOnItWhenItLands) {
     }
 }
 
-/// Three boxes fall onto three that lie in a sheet. They would be thrown out of it, or through it.
+/// Three boxes fall onto three that lie in a sheet. They would be thrown out of it, or through it, or come through it
+/// by millimetres with a corner beside a vertex, where another box is near.
 TEST(BoxesInAHammock, TakeOthersThatFallOntoThem) {
     const FreeScene scene = free_scenes::boxesInHammock("boxes in a hammock", 0.3);
-    for (int start = 0; start < 3; ++start) {
-        const FreeScene::Run run = scene.run(materials::cotton(), 24, start);
-        EXPECT_LT(run.outcome.deepest, 0.018) << "start " << start;
+    for (int start = 1; start <= 3; ++start) {
+        const FreeScene::Run run = scene.run(materials::cotton(), 22, start);
+        EXPECT_LT(run.outcome.deepest, 5e-4) << "start " << start;
         EXPECT_GT(run.lowest, 0.9) << "start " << start;
     }
 }

@@ -172,24 +172,13 @@ int ContactResponse::touchAtVertex(const Contact& contact, int corner) const {
     return known == m_index.end() ? -1 : known->second;
 }
 
-/// Whether a vertex is within an edge of some other body that does not touch it. What is fast sees others from afar.
-bool ContactResponse::isNearOthers(int vertex, int body) const {
-    return std::any_of(m_touches.begin(), m_touches.end(), [&](const Touch& touch) {
-        const Contact& other = touch.contact;
-        return other.isVertex() && !touch.active && other.body != body && other.gap < m_edge[other.shell] &&
-               globalVertex(other, 0) == vertex;
-    });
-}
-
 /// Whether a face's contact is nearly at a vertex that is held off the body there, or is being taken out of it, the
 /// same way. Beside a corner or an edge of the body, or beside a small ball, it is not: its triangle would go on into
-/// the body, and the more so where something else holds the vertex. Between the edges of two bodies, neither of which
-/// touches the vertex, each would push the triangle into the other: that is left to the vertex.
+/// the body, and the more so where something else holds the vertex.
 bool ContactResponse::isSaidByVertex(const Contact& contact) const {
     int corner = 0;
     if (contact.weights.maxCoeff(&corner) < 1.0 - kNearEdge) return false;
     const int vertex = globalVertex(contact, corner);
-    if (isNearOthers(vertex, contact.body)) return true;
     const auto isAlong = [&](const Vec3& n) { return n.dot(contact.normal) > kTheSame * n.norm(); };
     const int there = touchAtVertex(contact, corner);
     if (there >= 0 && m_touches[there].active && isAlong(m_touches[there].contact.normal)) return true;

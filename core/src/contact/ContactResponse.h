@@ -257,7 +257,6 @@ class ContactResponse {
     bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
     int touchOf(const Contact& contact) const;
     int touchAtVertex(const Contact& contact, int corner) const;
-    bool isNearOthers(int vertex, int body) const;
     bool isSaidByVertex(const Contact& contact) const;
     bool isForVertices(const Contact& contact, const IslandVelocities& solved) const;
     bool closeAtEnd(const Contact& contact, const IslandVelocities& solved, int round);
