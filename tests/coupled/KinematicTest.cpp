@@ -131,12 +131,6 @@ TEST_P(KinematicPlate, LiftsASheetThatSleepsOnIt) {
 INSTANTIATE_TEST_SUITE_P(Steps, KinematicPlate,
                          ::testing::Combine(::testing::Values(kStep, kStep / 4), ::testing::Values(1, 4)));
 
-/// Of an odd number of values.
-double medianOf(std::vector<double> values) {
-    std::sort(values.begin(), values.end());
-    return values[values.size() / 2];
-}
-
 /// What lies on the carpet, speed of the board [m/s].
 class LiftedCarpet : public ::testing::TestWithParam<std::tuple<std::string, double>> {
   protected:

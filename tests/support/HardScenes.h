@@ -31,6 +31,12 @@ inline std::unique_ptr<btTriangleMesh> surfaceMesh(double side, int cells,
     return mesh;
 }
 
+/// Of an odd number of values, as of several starts.
+inline double medianOf(std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    return values[values.size() / 2];
+}
+
 inline void place(ShellBody& sheet, const Vec3& by) {
     std::vector<btVector3> x(sheet.positions().begin(), sheet.positions().end());
     for (btVector3& p : x) p += btVector3(btScalar(by.x()), btScalar(by.y()), btScalar(by.z()));
