@@ -260,7 +260,7 @@ bool ContactResponse::areBorneByOthers() const {
     };
     for (int b = 0; b < std::ssize(m_input.bodies); ++b) {
         const CoupledBody& body = m_input.bodies[b];
-        if (body.prescribed ? !body.freeTwist.isZero(0.0) : !isBorne(b) || body.lightest() < mass) return false;
+        if (body.prescribed ? isLed(b) : !isBorne(b) || body.lightest() < mass) return false;
     }
     return std::none_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
         return !m_input.bodies[contact.body].prescribed && isUnderBody(contact, m_input.gravity);
