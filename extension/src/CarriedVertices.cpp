@@ -121,9 +121,17 @@ void CarriedVertices::bringAlong(ShellBody& body, const Vec3& gravity, double h)
 }
 
 /// How all of a shell follows what is tied to a body, by its inertia and its stiffness: as in a step from standing
-/// still in which that is led to its anchor. It does not fall in it as well, into what it lies on. Velocities stay as
-/// they are. None if the solve came to nothing.
+/// still in which that is led to its anchor, less the same step with the anchors where they are. In that it springs
+/// back from whatever holds it, and would go into what it lies on. Velocities stay as they are. None if a solve came to
+/// nothing.
 std::optional<Points> CarriedVertices::wayOfAll(Shell& shell, double h) const {
+    const std::optional<Points> led = wayWhenLed(shell, h, 1.0), left = wayWhenLed(shell, h, 0.0);
+    return led && left ? std::optional<Points>(*led - *left) : std::nullopt;
+}
+
+/// Way of all vertices without contacts and gravity, from standing still, while what is tied is led by a share of its
+/// own.
+std::optional<Points> CarriedVertices::wayWhenLed(Shell& shell, double h, double share) const {
     std::vector<CoupledBody> leaders;
     std::vector<Anchor> led;
     for (const auto& [carried, by] : m_shifts) {
@@ -131,7 +139,7 @@ std::optional<Points> CarriedVertices::wayOfAll(Shell& shell, double h) const {
         led.push_back({0, carried->vertex, static_cast<int>(leaders.size()), shell.positions().col(carried->vertex)});
         CoupledBody& leader = leaders.emplace_back();
         leader.prescribed = true;
-        leader.freeTwist.head<3>() = by / h;
+        leader.freeTwist.head<3>() = share / h * by;
     }
     const Points velocities = shell.velocities();
     shell.setVelocities(Points::Zero(3, shell.vertexCount()));

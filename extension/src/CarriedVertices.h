@@ -51,6 +51,7 @@ class CarriedVertices {
     static void moveAsOne(ShellBody& shell, std::vector<Shift>& shifts);
     void bringAlong(ShellBody& shell, const Vec3& gravity, double h);
     std::optional<Points> wayOfAll(Shell& shell, double h) const;
+    std::optional<Points> wayWhenLed(Shell& shell, double h, double share) const;
     double energyAlong(ShellBody& shell, const Points& way) const;
     void follow(Shell& shell, const Points& way);
     double strainAlone(const Shell& shell, bool ofTied) const;

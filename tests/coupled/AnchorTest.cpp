@@ -252,13 +252,14 @@ TEST(Anchors, DentMetalByNoMoreThanTheFallWhereABodyLandsHard) {
         }
 }
 
-/// A sheet on a floor that is tied to blocks by its corners, in the middle of their tops, lies on them. What leads it
-/// after them is not to push it in, its tied vertices are not to be taken out of their own blocks, and what is to be
-/// taken out is to take the time of a step, not that of a part of one: some steps took two thousand solves.
+/// A sheet that is tied to blocks by its corners, in the middle of their tops, lies on them. What leads it after them
+/// is not to push it in: not what springs back without the contacts either, which was every second step a millimetre.
+/// Its tied vertices are not to be taken out of their own blocks, and what is to be taken out is to take the time of a
+/// step, not that of a part of one: some steps took two thousand solves. (On a plane Bullet tips such blocks as well.)
 TEST(Anchors, LeaveASheetLyingOnItsBodies) {
-    constexpr int kCells = 24, kSteps = 60;
+    constexpr int kCells = 24, kSteps = 120;
     BulletScene scene;
-    scene.addFloor();
+    scene.addBox(btVector3(5, 1, 5), 0.0, btVector3(0, -1, 0)).setFriction(1);
     Bodies blocks;
     free_scenes::tiedToBlocks("tied", 1.0).make(scene, materials::cotton(), kCells, Vec3::Zero(), blocks);
     int solves = 0;
@@ -266,7 +267,7 @@ TEST(Anchors, LeaveASheetLyingOnItsBodies) {
         scene.step(kStep);
         solves += scene.shells->lastStep().solves;
     }
-    EXPECT_LT(solves, 30 * kSteps);
+    EXPECT_LT(solves, 10 * kSteps);
 }
 
 /// A ball around the middle of a sheet, which is tied to its centre: the middle is no contact that could be settled.

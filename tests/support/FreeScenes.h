@@ -180,21 +180,17 @@ inline FreeScene clothOnRoller(const char* name, double mass) {
             }};
 }
 
-/// Ties a sheet to blocks that stand under its corners, in the middle of their tops.
-inline void tieToBlocks(BulletScene& scene, ShellBody& sheet, int cells, double mass, Bodies& bodies) {
-    constexpr btScalar half = btScalar(0.05);
-    for (const int corner : {0, cells, (cells + 1) * cells, (cells + 1) * (cells + 1) - 1}) {
-        const btVector3 at = sheet.positions()[corner] - btVector3(0, half, 0);
-        bodies.push_back(&scene.addBox(btVector3(half, half, half), mass, at));
-        sheet.anchor(corner, *bodies.back());
-    }
-}
-
+/// A sheet that is tied to blocks, which stand under its corners, in the middle of their tops.
 inline FreeScene tiedToBlocks(const char* name, double mass) {
     return {name, 3.0, 6.0,
             [=](auto& scene, auto& material, int cells, const Vec3& aside, Bodies& bodies) -> ShellBody& {
-                auto& sheet = addSheet(scene, material, cells, Vec3(0.0, 0.1, 0.0) + aside);
-                tieToBlocks(scene, sheet, cells, mass, bodies);
+                constexpr btScalar half = btScalar(0.05);
+                auto& sheet = addSheet(scene, material, cells, Vec3(0.0, 2.0 * double(half), 0.0) + aside);
+                for (const int corner : {0, cells, (cells + 1) * cells, (cells + 1) * (cells + 1) - 1}) {
+                    const btVector3 at = sheet.positions()[corner] - btVector3(0, half, 0);
+                    bodies.push_back(&scene.addBox(btVector3(half, half, half), mass, at));
+                    sheet.anchor(corner, *bodies.back());
+                }
                 return sheet;
             }};
 }
