@@ -65,19 +65,6 @@ bool isOverRidge(const SurfacePoint& a, const SurfacePoint& b) {
     return !isAbove(a.point, b) && !isAbove(b.point, a);
 }
 
-/// Bounds of a piece, in the world.
-void worldBounds(const ConvexPiece& piece, const Frame& frame, Vec3& lower, Vec3& upper) {
-    const Vec3 centre = 0.5 * (piece.lower() + piece.upper()), half = 0.5 * (piece.upper() - piece.lower());
-    if (!half.allFinite() || !centre.allFinite() || half.maxCoeff() > 1e15) {  // a plane
-        lower.setConstant(-std::numeric_limits<double>::infinity());
-        upper.setConstant(std::numeric_limits<double>::infinity());
-        return;
-    }
-    const Vec3 reach = frame.linear().cwiseAbs() * half;
-    lower = frame * centre - reach;
-    upper = frame * centre + reach;
-}
-
 }  // namespace
 
 /// One shell against one obstacle at one pose.
@@ -172,9 +159,18 @@ void ShellContacts::collect(WorkerTeam* team, int count, std::vector<std::vector
     }
 }
 
+/// Of a piece at a pose of its body, in the world.
+Bounds ShellContacts::boundsOfPiece(const ConvexPiece& piece, const Frame& frame) {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    const Vec3 centre = 0.5 * (piece.lower() + piece.upper()), half = 0.5 * (piece.upper() - piece.lower());
+    if (!half.allFinite() || !centre.allFinite() || half.maxCoeff() > 1e15)  // a plane
+        return {Vec3::Constant(-kInfinity), Vec3::Constant(kInfinity)};
+    const Vec3 at = frame * centre, reach = frame.linear().cwiseAbs() * half;
+    return {at - reach, at + reach};
+}
+
 void ShellContacts::markOutside(const Query& query, const ConvexPiece& piece) {
-    Vec3 lower, upper;
-    worldBounds(piece, query.frame, lower, upper);
+    auto [lower, upper] = boundsOfPiece(piece, query.frame);
     const double reach = std::max(query.vertexReach, query.faceReach) + query.thickness();
     lower.array() -= std::max(reach, 0.0);
     upper.array() += std::max(reach, 0.0);

@@ -35,7 +35,8 @@ class ShellContacts final : public ContactDetector {
   private:
     struct Query;
     struct Sweep;
-    void sweepPiece(const Sweep& sweep, const SweepTarget& target, std::vector<Contact>& contacts);
+    void sweepPiece(const Sweep& sweep, const SweepTarget& target, const Bounds& bounds,
+                    std::vector<Contact>& contacts);
     void boundChunks(const HalfEdgeMesh& mesh, const Points& start, const Points& end);
     const TrianglePatch& wholeOf(const ConcavePiece& piece, double radius);
     static Contact makeContact(const Query& query, int feature, const SurfacePoint& surface,
@@ -45,6 +46,7 @@ class ShellContacts final : public ContactDetector {
     template <class Found>
     static void collect(WorkerTeam* team, int count, std::vector<std::vector<Found>>& lists, const auto& find,
                         const auto& use);
+    static Bounds boundsOfPiece(const ConvexPiece& piece, const Frame& frame);
     void markOutside(const Query& query, const ConvexPiece& piece);
     void findVertices(Query& query, const ConvexPiece& piece);
     static Vec3 sheetNormal(const Query& query, int vertex);

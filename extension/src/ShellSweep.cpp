@@ -19,6 +19,10 @@ Mat3 transformed(const Frame& frame, const Mat3& triangle) {
     return (frame.linear() * triangle).colwise() + frame.translation();
 }
 
+SurfacePoint placed(const Frame& frame, const SurfacePoint& surface) {
+    return {frame * surface.point, frame.linear() * surface.normal, surface.distance};
+}
+
 }  // namespace
 
 /// What is swept against, in the body's frame.
@@ -96,6 +100,16 @@ struct ShellContacts::Sweep {
                    last = moved(bodyStart, twist, time).translation();
         return {first.cwiseMin(last) - radius, first.cwiseMax(last) + radius};
     }
+    /// Of one of its pieces. Between its poses at both ends of the step a turning point is off the straight way by no
+    /// more than |w|^2 r t^2 / 8.
+    Bounds boundsOfSwept(const ConvexPiece& piece) const {
+        const double turn = twist.tail<3>().norm() * time, aside = 0.125 * turn * turn * obstacle.body.radius;
+        const Vec3 room = Vec3::Constant(aside + shell.contactThickness());
+        Bounds bounds = ShellContacts::boundsOfPiece(piece, moved(bodyStart, twist, 0.0));
+        bounds.include(ShellContacts::boundsOfPiece(piece, moved(bodyStart, twist, time)));
+        const Bounds whole = boundsOfBody();
+        return {whole.lower.cwiseMax(bounds.lower - room), whole.upper.cwiseMin(bounds.upper + room)};
+    }
     Bounds boundsOf(const std::array<int, 3>& corners) const {
         Bounds bounds{start.col(corners[0]), start.col(corners[0])};
         for (const int i : corners)
@@ -112,8 +126,9 @@ struct ShellContacts::Sweep {
     Vec3 relativeVelocity(int vertex, const Vec3& centre, const Vec3& at) const {
         return (end.col(vertex) - start.col(vertex)) / time - twist.head<3>() - twist.tail<3>().cross(at - centre);
     }
-    double closingSpeed(const SweepTarget& target, const std::array<int, 3>& corners, const Vec3& centre,
-                        const Mat3& triangle, const Vec3& normal) const;
+    double closingSpeed(const std::array<int, 3>& corners, const Vec3& centre, const Mat3& triangle) const;
+    double timeAbove(const SurfacePoint& plane, const std::array<int, 3>& corners, const Vec3& centre,
+                     const Mat3& triangle, double least) const;
     std::optional<Contact> advance(const SweepTarget& target, const std::array<int, 3>& corners) const;
     struct Touch {
         Contact contact;
@@ -125,19 +140,36 @@ struct ShellContacts::Sweep {
 };
 
 /// How fast any of the corners may come nearer to the target, but for the body's spin [m/s].
-double ShellContacts::Sweep::closingSpeed(const SweepTarget& target, const std::array<int, 3>& corners,
-                                          const Vec3& centre, const Mat3& triangle, const Vec3& normal) const {
+double ShellContacts::Sweep::closingSpeed(const std::array<int, 3>& corners, const Vec3& centre,
+                                          const Mat3& triangle) const {
     double closing = 0.0;
-    for (int a = 0; a < 3; ++a) {
-        const Vec3 velocity = relativeVelocity(corners[a], centre, triangle.col(a));
-        closing = std::max(closing, target.isConvex() ? -normal.dot(velocity) : velocity.norm());
-    }
+    for (int a = 0; a < 3; ++a)
+        closing = std::max(closing, relativeVelocity(corners[a], centre, triangle.col(a)).norm());
     return closing;
 }
 
-/// Conservative advancement (Mirtich 1996): as far in time as the distance allows at the largest closing speed, again
-/// and again, until they touch or the step is over. For a vertex all corners are the same. What touches without closing
-/// in by much goes on until it is deep: a triangle that tilts may yet let pass what its middle keeps up with.
+/// For how long all corners are higher than `least` over a plane that goes with the body, in front of which they are
+/// now: no point of a convex body comes to the triangle before. As a body turns, a corner's velocity relative to it
+/// changes by no more than 2 |w| |u| + |w|^2 |y|, where u is its velocity and y its place as seen from the centre.
+double ShellContacts::Sweep::timeAbove(const SurfacePoint& plane, const std::array<int, 3>& corners, const Vec3& centre,
+                                       const Mat3& triangle, double least) const {
+    const double spin = twist.tail<3>().norm(), little = 1e-2 * shell.contactThickness();
+    double soonest = std::numeric_limits<double>::infinity();
+    for (int a = 0; a < 3; ++a) {
+        const Vec3 at = triangle.col(a), from = at - centre;
+        const double height = std::max(plane.normal.dot(at - plane.point) - least, little);
+        const double rate = plane.normal.dot(relativeVelocity(corners[a], centre, at));
+        const double speed = ((end.col(corners[a]) - start.col(corners[a])) / time - twist.head<3>()).norm();
+        const double bend = spin * (2.0 * speed + spin * (from.norm() + speed * time));
+        soonest = std::min(soonest, 2.0 * height / (std::sqrt(rate * rate + 2.0 * bend * height) - rate));
+    }
+    return soonest;
+}
+
+/// Conservative advancement (Mirtich 1996): as far in time as the plane between the two stays between them, or the
+/// distance allows at the largest closing speed, again and again, until they touch or the step is over. For a vertex
+/// all corners are the same. What touches without closing in by much goes on until it is deep: a triangle that tilts
+/// may yet let pass what its middle keeps up with.
 std::optional<Contact> ShellContacts::Sweep::advance(const SweepTarget& target,
                                                      const std::array<int, 3>& corners) const {
     const double thickness = shell.contactThickness(), spin = twist.tail<3>().norm() * obstacle.body.radius;
@@ -150,8 +182,6 @@ std::optional<Contact> ShellContacts::Sweep::advance(const SweepTarget& target,
         const auto touch = target.touch(transformed(frame.inverse(Eigen::Isometry), triangle), isPoint);
         if (!touch) return std::nullopt;
         if (i == 0 && touch->surface.distance < 0.0) return std::nullopt;  // there from the start: not of this motion
-        const double closing =
-            closingSpeed(target, corners, frame.translation(), triangle, frame.linear() * touch->surface.normal);
         double left = touch->surface.distance - sought;
         if (left <= 1e-3 * thickness || i >= most) {
             const Touch found = touchAt(t, *touch, corners);
@@ -160,8 +190,10 @@ std::optional<Contact> ShellContacts::Sweep::advance(const SweepTarget& target,
             most += kMostAdvances;
             left = touch->surface.distance - sought;
         }
-        if (closing + spin <= 0.0) return std::nullopt;
-        t += std::max(left, 1e-2 * thickness) / (closing + spin);
+        if (target.isConvex())
+            t += timeAbove(placed(frame, touch->surface), corners, frame.translation(), triangle, sought);
+        else
+            t += std::max(left, 1e-2 * thickness) / (closingSpeed(corners, frame.translation(), triangle) + spin);
         if (t >= time) return std::nullopt;
     }
 }
@@ -187,9 +219,9 @@ ShellContacts::Sweep::Touch ShellContacts::Sweep::touchAt(double t, const Triang
 
 /// All vertices are swept against what stands or is led: a sheet that lies flat on it at the end of the step is held by
 /// each. A free body is stopped by what it hits first, and its other contacts come about later.
-void ShellContacts::sweepPiece(const Sweep& sweep, const SweepTarget& target, std::vector<Contact>& contacts) {
+void ShellContacts::sweepPiece(const Sweep& sweep, const SweepTarget& target, const Bounds& bounds,
+                               std::vector<Contact>& contacts) {
     const HalfEdgeMesh& mesh = sweep.shell.shell().mesh();
-    const Bounds bounds = sweep.boundsOfBody();
     const bool isLed = sweep.obstacle.body.prescribed;
     const auto isSaidByCorner = [&](const Contact& contact, const std::array<int, 3>& corners) {
         return std::any_of(corners.begin(), corners.end(), [&](int corner) {
@@ -253,11 +285,12 @@ void ShellContacts::sweep(const ContactSweep& motion, std::vector<Contact>& cont
                           m_start[body],    motion.twists[body],  motion.time};
         const auto first = static_cast<std::ptrdiff_t>(contacts.size());
         m_byFeature.clear();
-        for (const auto& piece : obstacle.shape->pieces) sweepPiece(sweep, ConvexTarget(*piece), contacts);
+        for (const auto& piece : obstacle.shape->pieces)
+            sweepPiece(sweep, ConvexTarget(*piece), sweep.boundsOfSwept(*piece), contacts);
         for (std::size_t k = 0; k < obstacle.shape->concave.size(); ++k)
             sweepPiece(sweep,
                        ConcaveTarget(patchOf(pair, k, sweep), obstacle.shape->concave[k].frame, obstacle.body.inner),
-                       contacts);
+                       sweep.boundsOfBody(), contacts);
         std::for_each(contacts.begin() + first, contacts.end(), [&, shell = shell, body = body](Contact& contact) {
             contact.shell = shell;
             contact.body = body;

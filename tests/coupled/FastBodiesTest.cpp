@@ -9,6 +9,7 @@
 #include "support/HardScenes.h"
 #include "support/SmallBox.h"
 #include "support/Target.h"
+#include "support/UserBall.h"
 
 namespace jacket::bullet::testing {
 namespace {
@@ -48,6 +49,43 @@ TEST_P(Bullet, NeverPassesSilentlyAndGainsNoEnergy) {
 INSTANTIATE_TEST_SUITE_P(Masses, Bullet,
                          ::testing::Combine(::testing::Values(1e-3, 1e-2, 1e-1, 1.0), ::testing::Bool(),
                                             ::testing::Range(0, 3)));
+
+/// Counts the support points that it is asked for.
+class AskedBall final : public UserBall {
+  public:
+    using UserBall::UserBall;
+    btVector3 localGetSupportingVertexWithoutMargin(const btVector3& v) const override {
+        ++m_asked;
+        return UserBall::localGetSupportingVertexWithoutMargin(v);
+    }
+    int asked() const { return m_asked; }
+
+  private:
+    mutable int m_asked = 0;
+};
+
+/// A body's spin moves nothing of it nearer to a plane in front of it than its own surface is, and what is out of reach
+/// of the surface need not be looked at.
+TEST(Sweeps, LookAtLittleMoreWhereABallSpins) {
+    constexpr int kStepsFarOff = 5;
+    int asked[2], farOff[2];
+    for (const bool spins : {false, true}) {
+        Target scene;
+        auto shape = std::make_unique<AskedBall>(btScalar(0.1));
+        const AskedBall& ball = *shape;
+        auto& body = scene.addBody(std::move(shape), 1.0, btVector3(btScalar(0.01), btScalar(0.4), btScalar(0.02)));
+        body.setLinearVelocity(btVector3(0, -2, 0));
+        if (spins) body.setAngularVelocity(btVector3(0, 0, 20));
+        for (int i = 0; i < 20; ++i) {
+            scene.step(1.0 / 60);
+            if (i < kStepsFarOff) farOff[spins] = ball.asked();
+        }
+        asked[spins] = ball.asked();
+        EXPECT_GT(body.getLinearVelocity().y(), -1) << "did not meet the sheet";
+    }
+    EXPECT_LT(farOff[1], kStepsFarOff * 400);  // the sheet has 800 triangles
+    EXPECT_LT(asked[1], 8 * asked[0]);
+}
 
 /// Slower ones, whether they fly from the first step or are launched between two steps, where the last solve knew
 /// nothing of their speed. Shape, launched, height [m]: how far off the first step ends.

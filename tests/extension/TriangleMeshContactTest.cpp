@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "support/HardScenes.h"
+#include "support/UserBall.h"
 
 namespace jacket::bullet::testing {
 namespace {
@@ -340,25 +341,6 @@ TEST(Compound, AnEmptyShapeIsNothing) {
 }
 
 /// Ball of a multi-sphere shape, and the same ball as a user's own shape.
-class UserBall : public btConvexInternalShape {
-  public:
-    explicit UserBall(btScalar radius) : m_radius(radius) { m_shapeType = CUSTOM_CONVEX_SHAPE_TYPE; }
-    btVector3 localGetSupportingVertexWithoutMargin(const btVector3& v) const override {
-        return v * (m_radius / v.length());
-    }
-    void batchedUnitVectorGetSupportingVertexWithoutMargin(const btVector3* in, btVector3* out, int n) const override {
-        for (int i = 0; i < n; ++i) out[i] = localGetSupportingVertexWithoutMargin(in[i]);
-    }
-    void calculateLocalInertia(btScalar mass, btVector3& inertia) const override {
-        inertia.setValue(1, 1, 1);
-        inertia *= btScalar(0.4) * mass * m_radius * m_radius;
-    }
-    const char* getName() const override { return "UserBall"; }
-
-  private:
-    btScalar m_radius;
-};
-
 TEST(OtherConvexShapes, HangInASheetLikeABall) {
     const btVector3 centre(0, 0, 0);
     const btScalar radius(0.2);
