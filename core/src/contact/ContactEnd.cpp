@@ -10,6 +10,7 @@ constexpr double kMostOffset =
     0.15;                            // of an edge: how far vertices are lifted off a curved body for their chords' sake
 constexpr double kDeep = 0.1;        // of an edge: what is worth another solve where few are made
 constexpr double kMostPush = 0.2;    // of an edge: how far pushOut goes
+constexpr double kLeastFree = 0.25;  // see freeWeights(): what is mostly held is not pushed
 constexpr int kMostTurns = 8;        // of the walls of a valley, at pushing
 constexpr double kSamePoint = 0.15;  // of an edge, or the body's radius: how far it may move in a round
 constexpr double kSameWay = 0.7;     // cosine of the angle between normals that push a vertex much the same way
@@ -385,7 +386,7 @@ void ContactResponse::findPushes(const Points& v) {
         const int touch = touchOf(contact);
         double lacks = missing(contact, touch);
         for (int a = 0; a < 3; ++a) lacks += contact.weights[a] * contact.normal.dot(sinceFound(contact, a, v));
-        if (lacks > -slopOf(contact) || isHeld(contact)) continue;
+        if (lacks > -slopOf(contact) || freeWeights(contact) < kLeastFree) continue;
         const double by = std::min(-lacks, kMostPush * m_edge[contact.shell]);
         m_pushes.push_back({&contact, by, lacks + by});
         if (touch >= 0) found.insert(touch);
@@ -433,16 +434,26 @@ bool ContactResponse::isHeld(const Contact& contact) const {
     return false;
 }
 
-/// Moves a contact's point out along its normal, besides what its vertices have been moved by. Whether it had to.
+/// Squares of the weights of those of a contact's vertices that nothing holds, summed. Each moved by its weight over
+/// this sum, they move the point by 1.
+double ContactResponse::freeWeights(const Contact& contact) const {
+    double sum = 0.0;
+    for (int a = 0; a < 3; ++a)
+        if (!m_held[globalVertex(contact, a)]) sum += contact.weights[a] * contact.weights[a];
+    return sum;
+}
+
+/// Moves a contact's point out along its normal by those of its vertices that nothing holds, besides what its vertices
+/// have been moved by. Whether it had to.
 bool ContactResponse::push(Push& one) {
     const Contact& contact = *one.contact;
     const Shell& shell = *m_input.shells[contact.shell];
-    const double damped = 1.0 + m_input.h * shell.material().massDamping;
+    const double damped = 1.0 + m_input.h * shell.material().massDamping, free = freeWeights(contact);
     bool isInside = false;
     for (int a = 0; a < (contact.isVertex() ? 1 : 3); ++a) {
-        if (contact.weights[a] == 0.0) continue;
+        if (contact.weights[a] == 0.0 || m_held[globalVertex(contact, a)]) continue;
         Vec3& before = m_pushed.try_emplace(globalVertex(contact, a), Vec3::Zero()).first->second;
-        const double missing = one.by * contact.weights[a] / contact.weights.squaredNorm() - before.dot(contact.normal);
+        const double missing = one.by * contact.weights[a] / free - before.dot(contact.normal);
         if (missing <= 0.0) continue;
         isInside |= missing > m_vertexSlop;
         before += missing * contact.normal;

@@ -254,6 +254,7 @@ class ContactResponse {
     Vec3 sinceFound(const Contact& contact, int corner, const Points& v) const;
     bool push(Push& one);
     bool isHeld(const Contact& contact) const;
+    double freeWeights(const Contact& contact) const;
     bool checkEnd(const IslandVelocities& solved, const Points& y, int round);
     int touchOf(const Contact& contact) const;
     int touchAtVertex(const Contact& contact, int corner) const;
