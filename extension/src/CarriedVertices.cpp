@@ -105,15 +105,20 @@ void CarriedVertices::findShifts(const ShellBody& shell, std::span<const Carried
 
 /// Where a body was stopped, or struck, a vertex that alone followed it would tear at the shell. If that is more than
 /// its energy allows for, all of the shell follows. What even that would strain by more than its energy is left to the
-/// next solve.
+/// next solve, and so is what bodies at rest stray by: that solve knows the shell's contacts.
 void CarriedVertices::bringAlong(ShellBody& body, const Vec3& gravity, double h) {
     constexpr double kLittle = 0.01;  // of the energy of motion
+    constexpr double kOfFall = 0.2;   // of what falls in a step: bodies that stray by more are solved anew
     Shell& shell = body.m_shell;
     const double moving = energyOfMotion(shell, gravity, h);
     if (strainAlone(shell, true) <= kLittle * moving) return;
     const double before = shell.elasticEnergy(shell.positions());
     if (energyAfter(body, 0.0) <= before + kLittle * moving) return;
-    const std::optional<Points> way = wayOfAll(shell, h);
+    const double little = kOfFall * h * h * gravity.norm();
+    const bool isLittle = std::all_of(m_shifts.begin(), m_shifts.end(), [&](const Shift& shift) {
+        return !shift.carried->isTied() || shift.by.norm() < little;
+    });
+    const std::optional<Points> way = isLittle ? std::nullopt : wayOfAll(shell, h);
     if (way && energyAlong(body, *way) <= before + moving)
         follow(shell, *way);
     else
