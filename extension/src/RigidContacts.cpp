@@ -82,11 +82,6 @@ double weightUnder(const btRigidBody& body, const btCollisionObject& other, doub
     return isHeld ? kSupport * linearMassOf(body) : linearMassOf(*under) / points;
 }
 
-/// Of a support on a body with that twist, along its row [N s].
-double impulseOf(const BodySupport& support, const Vec6& twist) {
-    return support.weight * (support.velocity - support.row.dot(twist));
-}
-
 /// By friction in Bullet's last solve, on the manifold's first body [N s].
 Vec3 frictionOf(const btManifoldPoint& point) {
     return fromBullet(point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
@@ -274,7 +269,7 @@ void RigidContacts::addFriction(const btRigidBody& body, CoupledBody& coupled) c
         impulse += own;
         power += own.dot(coupled.freeTwist) - friction.dot(pointVelocity(other, at, 0.0));
         const double pressing = areJoined(body, other) ? double(point.m_appliedImpulse)
-                                                       : impulseOf(coupled.supports[support++], coupled.freeTwist);
+                                                       : coupled.supports[support++].impulseOn(coupled.freeTwist);
         sum += friction.norm();
         most += double(point.m_combinedFriction) * std::max(0.0, pressing);
     });

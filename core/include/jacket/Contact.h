@@ -29,6 +29,8 @@ struct BodySupport {
     double velocity = 0.0;    ///< of what is on the other side, and by which the two are to part at least [m/s]
     double weight = 0.0;      ///< how heavy that is [kg; kg m^2 about an axis], > 0
     ImpulseRange range{};
+    /// On a body with that twist, along the row [N s; N m s about an axis].
+    double impulseOn(const Vec6& twist) const { return weight * (velocity - row.dot(twist)); }
 };
 
 /// A rigid body that takes part in the shells' solve. Twists are (velocity of the centre of mass, angular velocity).

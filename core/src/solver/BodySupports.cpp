@@ -12,11 +12,7 @@ constexpr double kPull = 1e-2;   // of a body's weight, or of what is pressed on
                                  // that pulls less may stay for the step
 constexpr int kMostReturns = 1;  // a contact that has let go twice stays away: it closes in the bodies' own step
 
-/// Of what holds a body, or two together [N s].
-double impulseOf(const BodySupport& support, const Vec6& twist) {
-    return support.weight * (support.velocity - support.row.dot(twist));
-}
-
+/// Of what holds two bodies together [N s].
 double impulseOf(const RigidContact& pair, const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) {
     return pair.weight * (pair.velocity - pair.rowA.dot(w.col(pair.a)) - pair.rowB.dot(w.col(pair.b)));
 }
@@ -167,7 +163,7 @@ void BodySupports::findLoads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) 
         return range.pulls() ? std::abs(impulse) : impulse;
     };
     for (const auto& [body, contact, hold] : m_supports)
-        if (hold.holds) most[body] = std::max(most[body], loadOf(contact.range, impulseOf(contact, w.col(body))));
+        if (hold.holds) most[body] = std::max(most[body], loadOf(contact.range, contact.impulseOn(w.col(body))));
     for (const auto& [contact, hold] : m_pairs) {
         if (!hold.holds) continue;
         const double load = loadOf(contact.range, impulseOf(contact, w));
@@ -182,7 +178,7 @@ bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, dou
     const std::vector<double>& load = m_loads;
     for (Support& support : m_supports) {
         const auto& [row, velocity, weight, range] = support.contact;
-        const double impulse = impulseOf(support.contact, w.col(support.body));
+        const double impulse = support.contact.impulseOn(w.col(support.body));
         const double slack = kPull * std::max(lightest(support.body) * kick, load[support.body]);
         if (!support.hold.turn(range, impulse, slack)) continue;
         const double sign = support.hold.holds ? 1.0 : -1.0;
