@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "support/HardScenes.h"
+#include "support/PlateScene.h"
 
 namespace jacket::bullet::testing {
 namespace {
@@ -432,6 +433,16 @@ TEST(Contact, ASheetPutRightOnABoxLiesOnItsTop) {
     scene.step(kStep);
     for (const BodyContact& contact : sheet.contacts()) EXPECT_GT(contact.contact.normal.y(), 0.99);
     EXPECT_GT(sheet.contacts().size(), 36u);  // of 49 vertices
+}
+
+/// It begins inside a free box by its thickness, which is taken out of it in the time of a step or of parts of one.
+TEST(Contact, APlatePutRightOnAFreeBoxIsNotThrown) {
+    for (const int cells : {6, 12})
+        for (const double aside : {0.0, 1e-7, 2e-7, 3e-7}) {
+            const SheetOutcome plate = PlateScene{materials::steel(5e-4), 0.9, cells, kStep, 20.0, aside, 0.0}.run();
+            EXPECT_LT(plate.fastest, 1.0) << cells << " cells, " << aside;
+            EXPECT_LT(plate.shoved, 1e-3) << cells << " cells, " << aside;
+        }
 }
 
 TEST(Contact, AClothOfFineMeshGainsNoEnergyFromABox) {

@@ -266,7 +266,7 @@ void ContactResponse::aim(Touch& touch, double lacks, const IslandVelocities& so
     if (m_onlyStops) take = lacks - std::min(0.0, before);
     if (leavesSlowly(contact)) {  // from where it really is: each end of a body that lies aslant has its own depth
         const double start = before + touch.allowedGap;
-        const double out = m_input.h * speedOutOf(-start, contact.body);
+        const double out = m_input.h * speedOutOf(-start);
         take = lacks + touch.allowedGap - (start < 0.0 ? std::min(0.0, start + out) : 0.0);
     }
     touch.allowedGap += lacks - take;

@@ -414,18 +414,10 @@ bool ContactResponse::isLed(int body) const {
     return m_input.bodies[body].prescribed && !m_input.bodies[body].freeTwist.isZero(0.0);
 }
 
-/// Of a penetration. Where bodies are free the parts of a step take back as much together as a whole one: as much in
-/// each of them, in its short time, would throw the bodies, and strain what lies between them. What a body that its
-/// user moves has gone into is taken back sooner, for it goes on.
-double ContactResponse::shareTakenBack(int body) const {
-    return hasFreeBodies() && !isLed(body) ? 1.0 - std::pow(1.0 - kAlteration, m_partOfStep) : kAlteration;
-}
-
 /// With which a free body leaves a surface that it stands inside and that cannot give way [m/s]: in steps that take
 /// back a share of the depth, and never so fast that it would rise above the surface.
-double ContactResponse::speedOutOf(double depth, int body) const {
-    return std::min(shareTakenBack(body) * depth / m_input.h,
-                    std::sqrt(std::max(m_input.gravity.norm(), 1e-3) * depth));
+double ContactResponse::speedOutOf(double depth) const {
+    return std::min(kAlteration * depth / m_input.h, std::sqrt(std::max(m_input.gravity.norm(), 1e-3) * depth));
 }
 
 /// Takes out of what was found the vertices and edges that a free body cannot move, and beside which it is nearer to a
@@ -532,12 +524,12 @@ void ContactResponse::alter(Touch& touch, Points& y) const {
     const Contact& c = touch.contact;
     const bool isHeldThere = isHeld(c);
     if (isBacked(c) || (isHeldThere && !c.isVertex())) {
-        touch.target = speedOutOf(-c.gap, c.body);
+        touch.target = speedOutOf(-c.gap);
         touch.allowedGap = std::min(0.0, c.gap + m_input.h * touch.target);
         return;
     }
     if (isHeldThere) return;
-    const double by = shareTakenBack(c.body) * std::min(-c.gap, m_edge[c.shell]);
+    const double by = kAlteration * std::min(-c.gap, m_edge[c.shell]);
     const double spread = c.weights.squaredNorm();
     for (int a = 0; a < (c.isVertex() ? 1 : 3); ++a) {
         auto column = y.col(globalVertex(c, a));

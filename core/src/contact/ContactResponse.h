@@ -201,8 +201,7 @@ class ContactResponse {
     bool isSurface(const Contact& contact) const;
     bool isLed(int body) const;
     bool leavesSlowly(const Contact& contact) const;
-    double shareTakenBack(int body) const;
-    double speedOutOf(double depth, int body) const;
+    double speedOutOf(double depth) const;
     void dropPassed();
     static bool isBeside(const Contact& contact, const Contact& face);
     double slopOf(const Contact& contact) const;
