@@ -130,7 +130,8 @@ struct IslandSolver::Impl {
 
     // IslandLedger.cpp: impulses that add up
     void pushOut(const IslandInput& input, StepReport& report);
-    void makePossible(const IslandInput& input, std::span<ContactImpulse> impulses) const;
+    void makePossible(const IslandInput& input, std::span<ContactImpulse> impulses);
+    Vec6 givenTo(const IslandInput& input, std::size_t k, const Points& solved, const Vec3& centre) const;
     void balance(const IslandInput& input, std::vector<ContactImpulse>& impulses);
     Vec6 excessOf(int body, const Vec6& residual) const;
     void shift(const IslandInput& input, std::span<const Vec3> onShells, std::vector<ContactImpulse>& impulses);

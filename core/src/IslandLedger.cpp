@@ -9,12 +9,17 @@
 namespace jacket {
 namespace {
 
-/// From a body's centre of mass to where the shell touches it, at the start of the step.
-Vec3 contactArm(const IslandInput& input, const Contact& contact) {
-    Vec3 arm = -input.bodies[contact.body].position;
+/// Where a shell touches a body, at the start of the step.
+Vec3 contactPoint(const IslandInput& input, const Contact& contact) {
+    Vec3 point = Vec3::Zero();
     for (int a = 0; a < 3; ++a)
-        arm += contact.weights[a] * input.shells[contact.shell]->positions().col(contact.vertices[a]);
-    return arm;
+        point += contact.weights[a] * input.shells[contact.shell]->positions().col(contact.vertices[a]);
+    return point;
+}
+
+/// From a body's centre of mass to there.
+Vec3 contactArm(const IslandInput& input, const Contact& contact) {
+    return contactPoint(input, contact) - input.bodies[contact.body].position;
 }
 
 /// The part of a contact's impulse that it can give: it pushes, with friction as Coulomb allows it.
@@ -44,22 +49,58 @@ void IslandSolver::Impl::pushOut(const IslandInput& input, StepReport& report) {
 }
 
 /// Where contacts did not settle, some push by a multiple of what others pull, and what bears the shell may yield to
-/// the moment of that. Of each shell's contacts with walls what can be is taken, as much as makes up what they gave it.
-void IslandSolver::Impl::makePossible(const IslandInput& input, std::span<ContactImpulse> impulses) const {
-    constexpr double kLeast = 1e-6;  // so that they still share what is missing
+/// the moment of that. Of each shell's contacts with walls what can be is taken, as much as makes up what the shell
+/// got, in impulse and in moment: forces that hold a strained shell on both sides of a body would else turn that about.
+void IslandSolver::Impl::makePossible(const IslandInput& input, std::span<ContactImpulse> impulses) {
+    constexpr double kLeast = 1e-9;  // so that they still share what is missing
+    system.velocities(u, reached);   // `v` may have been cut short since
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
-        Vec3 before = Vec3::Zero(), after = Vec3::Zero();
+        const Points& x = input.shells[k]->positions();
+        const Vec3 centre = x.rowwise().mean();
+        const double radius = (x.colwise() - centre).colwise().norm().maxCoeff();
+        Vec6 possible = Vec6::Zero();
         for (ContactImpulse& one : impulses) {
             if (one.contact.shell != static_cast<int>(k)) continue;
-            before += one.impulse;
             one.impulse = possiblePart(one);
-            after += one.impulse;
+            possible += pointImpulse(one.impulse, contactPoint(input, one.contact) - centre);
         }
-        if (after.isZero(0.0)) continue;
-        const double share = std::clamp(before.dot(after) / after.squaredNorm(), kLeast, 1.0);
+        if (possible.isZero(0.0)) continue;
+        Vec6 given = givenTo(input, k, reached, centre);
+        for (const Anchor& anchor : input.anchors)
+            if (anchor.shell == static_cast<int>(k) && !input.shells[k]->isPinned(anchor.vertex))
+                given += pointImpulse(unfiltered().col(offsets[k] + anchor.vertex), x.col(anchor.vertex) - centre);
+        possible.tail<3>() /= radius;
+        given.tail<3>() /= radius;
+        const double share = std::clamp(impulseShare * given.dot(possible) / possible.squaredNorm(), kLeast, 1.0);
         for (ContactImpulse& one : impulses)
             if (one.contact.shell == static_cast<int>(k)) one.impulse *= share;
     }
+}
+
+/// What contacts and anchors have given the free vertices of a shell in the last solve, which ended with the velocities
+/// `solved`: impulse [N s], and its moment about `centre` [N m s].
+Vec6 IslandSolver::Impl::givenTo(const IslandInput& input, std::size_t k, const Points& solved,
+                                 const Vec3& centre) const {
+    const Shell& shell = *input.shells[k];
+    const Points& x = shell.positions();
+    const auto unheld = unfiltered().middleCols(offsets[k], shell.vertexCount());
+    Vec6 given = Vec6::Zero();
+    given.head<3>() = -unheld.rowwise().sum();
+    const auto take = [&](int i, const Vec3& impulse) {
+        if (shell.isPinned(i))
+            given.head<3>() -= impulse;
+        else
+            given.tail<3>() += (x.col(i) - centre).cross(impulse);
+    };
+    for (int i = 0; i < shell.vertexCount(); ++i) take(i, -unheld.col(i));
+    for (const auto& row : system.rows()) {
+        if (row.vertices[0] < offsets[k] || row.vertices[0] >= offsets[k] + shell.vertexCount()) continue;
+        const Vec3 impulse = system.rowImpulse(row, solved, u.w);
+        given.head<3>() += impulse;
+        for (int a = 0; a < 3; ++a)
+            if (row.weights[a] > 0.0) take(row.vertices[a] - offsets[k], row.weights[a] * impulse);
+    }
+    return given;
 }
 
 /// Makes the ledger exact whatever the tolerance: what the contacts report, what the bodies got and what the shells'
@@ -118,15 +159,11 @@ Vec6 IslandSolver::Impl::excessOf(int body, const Vec6& residual) const {
 /// stiff, and its mass would turn little force into much speed, into them. A shell that touches none moves by it.
 void IslandSolver::Impl::shift(const IslandInput& input, std::span<const Vec3> onShells,
                                std::vector<ContactImpulse>& impulses) {
-    system.velocities(u, reached);  // `v` may have been cut short since
+    system.velocities(u, reached);  // see makePossible
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         if (shell.pinCount() > 0) continue;
-        Vec3 given = -unfiltered().middleCols(offsets[k], shell.vertexCount()).rowwise().sum();
-        for (const auto& row : system.rows())
-            if (row.vertices[0] >= offsets[k] && row.vertices[0] < offsets[k] + shell.vertexCount())
-                given += system.rowImpulse(row, reached, u.w);
-        const Vec3 missing = impulseShare * given - onShells[k];
+        const Vec3 missing = impulseShare * givenTo(input, k, reached, Vec3::Zero()).head<3>() - onShells[k];
         if (giveToWalls(input, static_cast<int>(k), missing, impulses)) continue;
         v.middleCols(offsets[k], shell.vertexCount()).colwise() -=
             (missing / (shell.masses().sum() * damping(input, shell))).eval();
