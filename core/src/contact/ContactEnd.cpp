@@ -265,8 +265,10 @@ void ContactResponse::aim(Touch& touch, double lacks, const IslandVelocities& so
     double take = isBetweenBodies(touch) ? kAlteration * lacks : lacks;
     if (m_onlyStops) take = lacks - std::min(0.0, before);
     if (leavesSlowly(contact)) {  // from where it really is: each end of a body that lies aslant has its own depth
-        const double start = before + touch.allowedGap;
-        const double out = m_input.h * speedOutOf(-start);
+        double start = before + touch.allowedGap;
+        // No deeper than anything was: beside a round body that goes far, what is outside seems to come from inside.
+        if (m_partOfStep < 1.0) start = std::max(start, m_gapAtStart[contact.body]);
+        const double out = m_input.h * speedOutOf(-start, contact);
         take = lacks + touch.allowedGap - (start < 0.0 ? std::min(0.0, start + out) : 0.0);
     }
     touch.allowedGap += lacks - take;

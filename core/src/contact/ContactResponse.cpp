@@ -210,9 +210,9 @@ double ContactResponse::findReach() {
     return most;
 }
 
-/// What is near at the start of the step, into m_found. Faces are looked for where the last step held any, and as far
-/// as vertices where free bodies meet surfaces, or come: known by walls, by pins everywhere and by stiff shells before
-/// anything is found, else by the vertices that are.
+/// What is near at the start of the step, into m_found. Faces are looked for where the last step held any, or a part of
+/// this one may have left any inside, and as far as vertices where free bodies meet surfaces, or come: known by walls,
+/// by pins everywhere and by stiff shells before anything is found, else by the vertices that are.
 void ContactResponse::findAtStart(double reach) {
     const auto find = [&](double faceReach) {
         m_found.clear();
@@ -225,12 +225,16 @@ void ContactResponse::findAtStart(double reach) {
     for (const Shell* shell : m_input.shells)
         m_stiff.push_back(hasFreeBodies() && shell->pinCount() > 0 && shell->isStiffAsAWhole(m_input.h));
     const bool areSurfaces = mayBeBacked() || hasSurfaces();
-    find(areSurfaces ? reach : m_memory.empty() ? kNone : 10.0 * m_vertexSlop);
+    const bool wantsFaces = !m_memory.empty() || m_partOfStep < 1.0;
+    find(areSurfaces ? reach : wantsFaces ? 10.0 * m_vertexSlop : kNone);
     findComing();
     const bool isAnyComing = std::find(m_comes.begin(), m_comes.end(), 1) != m_comes.end();
     const bool isBesidePin = !areSurfaces && mayBeBacked();
     if (!areSurfaces && (isBesidePin || isAnyComing)) find(reach);
     if (areSurfaces || isBesidePin) findBacked();
+    m_gapAtStart.assign(m_input.bodies.size(), 0.0);
+    for (const Contact& contact : m_found)
+        m_gapAtStart[contact.body] = std::min(m_gapAtStart[contact.body], contact.gap);
 }
 
 /// Takes out of what was found the vertices that are anchored to the body that they touch, and what is nearly at one:
@@ -414,10 +418,21 @@ bool ContactResponse::isLed(int body) const {
     return m_input.bodies[body].prescribed && !m_input.bodies[body].freeTwist.isZero(0.0);
 }
 
+/// Of a penetration. Where bodies are free the parts of a step take back as much together as a whole one: as much in
+/// each of them, in its short time, would throw the bodies, and strain what lies between them. What a body that its
+/// user moves has gone into is taken back sooner, for it goes on; and so is sheet metal, which each part that it stays
+/// inside strains.
+double ContactResponse::shareTakenBack(const Contact& contact) const {
+    const bool isPart = m_partOfStep < 1.0 && hasFreeBodies() && !isLed(contact.body);
+    if (!isPart || m_input.shells[contact.shell]->isStiffAsAWhole(m_input.h / m_partOfStep)) return kAlteration;
+    return 1.0 - std::pow(1.0 - kAlteration, m_partOfStep);
+}
+
 /// With which a free body leaves a surface that it stands inside and that cannot give way [m/s]: in steps that take
 /// back a share of the depth, and never so fast that it would rise above the surface.
-double ContactResponse::speedOutOf(double depth) const {
-    return std::min(kAlteration * depth / m_input.h, std::sqrt(std::max(m_input.gravity.norm(), 1e-3) * depth));
+double ContactResponse::speedOutOf(double depth, const Contact& contact) const {
+    return std::min(shareTakenBack(contact) * depth / m_input.h,
+                    std::sqrt(std::max(m_input.gravity.norm(), 1e-3) * depth));
 }
 
 /// Takes out of what was found the vertices and edges that a free body cannot move, and beside which it is nearer to a
@@ -524,12 +539,12 @@ void ContactResponse::alter(Touch& touch, Points& y) const {
     const Contact& c = touch.contact;
     const bool isHeldThere = isHeld(c);
     if (isBacked(c) || (isHeldThere && !c.isVertex())) {
-        touch.target = speedOutOf(-c.gap);
+        touch.target = speedOutOf(-c.gap, c);
         touch.allowedGap = std::min(0.0, c.gap + m_input.h * touch.target);
         return;
     }
     if (isHeldThere) return;
-    const double by = kAlteration * std::min(-c.gap, m_edge[c.shell]);
+    const double by = shareTakenBack(c) * std::min(-c.gap, m_edge[c.shell]);
     const double spread = c.weights.squaredNorm();
     for (int a = 0; a < (c.isVertex() ? 1 : 3); ++a) {
         auto column = y.col(globalVertex(c, a));

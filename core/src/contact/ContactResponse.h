@@ -201,7 +201,8 @@ class ContactResponse {
     bool isSurface(const Contact& contact) const;
     bool isLed(int body) const;
     bool leavesSlowly(const Contact& contact) const;
-    double speedOutOf(double depth) const;
+    double shareTakenBack(const Contact& contact) const;
+    double speedOutOf(double depth, const Contact& contact) const;
     void dropPassed();
     static bool isBeside(const Contact& contact, const Contact& face);
     double slopOf(const Contact& contact) const;
@@ -286,9 +287,10 @@ class ContactResponse {
     std::vector<char> m_mayCross;          ///< per body: see passes
     std::vector<char> m_comes;             ///< per body: see findComing
     bool m_anyFast = false;
-    std::vector<char> m_stiff;  ///< per shell: has pins and is stiff as a whole, beside free bodies
-    bool m_onlyStops = false;   ///< see Numbering
-    double m_partOfStep = 1.0;  ///< see Numbering
+    std::vector<double> m_gapAtStart;  ///< per body: of what stands deepest in it then, 0: nothing [m]
+    std::vector<char> m_stiff;         ///< per shell: has pins and is stiff as a whole, beside free bodies
+    bool m_onlyStops = false;          ///< see Numbering
+    double m_partOfStep = 1.0;         ///< see Numbering
     std::vector<Contact> m_found;
     std::pmr::map<int, double> m_room{&m_pool};            ///< of vertices: see findRoomBesideFaces [m]
     std::pmr::set<std::pair<int, int>> m_backed{&m_pool};  ///< (vertex, free body): see findBacked
