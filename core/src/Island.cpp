@@ -66,7 +66,7 @@ void IslandSolver::Impl::attempt(const IslandInput& input) {
     StepReport& report = lastReport;
     clearReport();
     impulseShare = 1.0;
-    unsettled = isTooLong = false;
+    unsettled = isTooLong = isLeftDeep = false;
     times = {};
     givesWay = givesWay || !wouldBeStrained(input);
     gather(input);
@@ -87,15 +87,23 @@ void IslandSolver::Impl::attempt(const IslandInput& input) {
     if (!report.finite) return;
     if (!dynamicBodies.empty()) limitBodies(input, report);
     LapTimer closing(input);
+    isLeftDeep = endsDeep();
     report.passed = response.passes({v, endTwists(), unfiltered()}, y, unsettled || report.limited);
     closing.addTo(report.times.contact);
     report.settled = !unsettled;
     report.mayPass = response.hasFastBody() && (report.limited || unsettled);
 }
 
-/// Whether contacts with a fast body did not settle in the whole of a step, or Newton's method.
+/// Whether contacts with a fast body did not settle in the whole of a step, or Newton's method, or what did not leaves
+/// shells deep in free bodies.
 bool IslandSolver::Impl::isWorthParts() const {
-    return isTooLong || ((lastReport.passed || lastReport.mayPass) && mayBeShorter);
+    return isTooLong || ((lastReport.passed || lastReport.mayPass || isLeftDeep) && mayBeShorter);
+}
+
+bool IslandSolver::Impl::endsDeep() {
+    constexpr double kDeep = 10.0;  // times the contacts' slop
+    if (!unsettled || !mayBeShorter || dynamicBodies.empty()) return false;
+    return response.gapAtEnd({v, endTwists(), unfiltered()}, y) < -kDeep * response.slop();
 }
 
 void IslandSolver::Impl::solveInParts(const IslandInput& input) {

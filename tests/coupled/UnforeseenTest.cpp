@@ -24,7 +24,7 @@ double deepestIn(const Bodies& bodies, const ShellBody& shell) {
 class KickedBall : public ::testing::TestWithParam<std::tuple<double, int>> {};
 
 TEST_P(KickedBall, TakesTheClothOnItAlong) {
-    constexpr int kStarts = 4;
+    constexpr int kStarts = 8;
     const auto [speed, stepsASecond] = GetParam();
     const double h = 1.0 / stepsASecond;
     for (int start = 0; start < kStarts; ++start) {

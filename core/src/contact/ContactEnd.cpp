@@ -44,6 +44,16 @@ void ContactResponse::findAtEnd(const IslandVelocities& solved, const Points& y)
     dropPassed();
 }
 
+double ContactResponse::gapAtEnd(const IslandVelocities& solved, const Points& y) {
+    findAtEnd(solved, y);
+    double least = 0.0;
+    for (const Contact& contact : m_found) {
+        const int touch = touchOf(contact);
+        if (touch < 0 || !m_touches[touch].jammed) least = std::min(least, missing(contact, touch));
+    }
+    return least;
+}
+
 ContactSweep ContactResponse::wayToEnd(std::span<const char> bodies) {
     m_startPoses.clear();
     m_endPoses.clear();

@@ -80,6 +80,8 @@ class ContactResponse {
     void forget(int body) { m_forgotten.insert(body); }
     double slop() const { return m_vertexSlop; }
     bool hasFastBody() const { return m_anyFast; }
+    /// How deep the step really ends, < 0: the last round may have looked at nothing but what pulls [m].
+    double gapAtEnd(const IslandVelocities& solved, const Points& y);
     /// Whether a body goes through a shell with these velocities. `isUnsure`: to be asked of all bodies.
     bool passes(const IslandVelocities& solved, const Points& y, bool isUnsure);
 
