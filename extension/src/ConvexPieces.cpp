@@ -164,13 +164,13 @@ class PlacedPiece final : public ConvexPiece {
     }
     std::optional<SurfacePoint> touch(const Vec3& p, double reach) const override {
         auto s = m_solid.touch(Vec3(m_frame.linear().transpose() * (p - m_frame.translation())), reach);
-        if (s) place(*s);
+        if (s) s = placed(m_frame, *s);
         return s;
     }
     std::optional<TrianglePoint> touch(const Mat3& triangle, double reach) const override {
         const Mat3 local = m_frame.linear().transpose() * (triangle.colwise() - m_frame.translation());
         auto t = m_solid.touch(local, reach);
-        if (t) place(t->surface);
+        if (t) t->surface = placed(m_frame, t->surface);
         return t;
     }
     Vec3 lower() const override { return m_lower; }
@@ -178,11 +178,6 @@ class PlacedPiece final : public ConvexPiece {
     bool asksShape() const override { return std::is_same_v<Solid, CcdSolid>; }
 
   private:
-    void place(SurfacePoint& s) const {
-        s.point = m_frame * s.point;
-        s.normal = m_frame.linear() * s.normal;
-    }
-
     Solid m_solid;
     Frame m_frame;
     Vec3 m_lower, m_upper;

@@ -7,6 +7,11 @@ class btConvexShape;
 
 namespace jacket::bullet {
 
+/// The same point of a surface that stands at a pose.
+inline SurfacePoint placed(const Frame& pose, const SurfacePoint& surface) {
+    return {pose * surface.point, pose.linear() * surface.normal, surface.distance};
+}
+
 /// Convex pieces of a shape: itself, or its children when it is a compound. Leaves out what is concave: see
 /// concavePieces(). Appends to `unsupported` the Bullet name of every child that is neither. Sphere, box, capsule,
 /// cylinder, cone, static plane and convex hull are copied; the pieces of any other convex shape ask that shape, which

@@ -309,9 +309,6 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
     const double margin = std::max({reach, query.wantsFaces() ? faceReach : 0.0, depth});
     const Bounds near{x.rowwise().minCoeff().array() - margin, x.rowwise().maxCoeff().array() + margin};
     cover(patch, piece, near, margin);
-    const auto place = [&](const SurfacePoint& s) -> SurfacePoint {
-        return {piece.frame * s.point, piece.frame.linear() * s.normal, s.distance};
-    };
     // Moving meshes get deeper into coarse sheets.
     const bool isStill = query.isPrescribed && m_obstacles[query.body].body.freeTwist.isZero(0.0);
     // The other side of a valley may be nearer to what lies beside a contact.
@@ -319,7 +316,7 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
         return [&, at = surface.point](const Vec3& p, double within) -> std::optional<SurfacePoint> {
             const auto nearest = patch->touchNearest(toPiece * p, within, 0.0);
             if (!nearest || (nearest->point - at).norm() > kSamePoint * query.thickness()) return {};
-            return place(*nearest);
+            return placed(piece.frame, *nearest);
         };
     };
     const auto findVerticesIn = [&](int begin, int end, auto& found) {
@@ -328,7 +325,7 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
             touched.clear();
             patch->touch(Vec3(x.col(i)), query.reachOf(i) + query.thickness(), depth, touched);
             for (const SurfacePoint& surface : touched) {
-                append(found, {i, place(surface)});
+                append(found, {i, placed(piece.frame, surface)});
                 if (isStill && query.turnsAt(surface.distance))
                     turnAsSheetDoes(query, besideAt(surface), sheetNormal(query, i), found.back().surface);
             }
@@ -345,7 +342,7 @@ void ShellContacts::findConcave(Query& query, const ConcavePiece& piece, std::un
             touched.clear();
             patch->touch(triangle, edgesOf(mesh, x, t), faceReach, depth, touched);
             for (const auto& [surface, weights] : touched) {
-                append(found, {t, {place(surface), weights}});
+                append(found, {t, {placed(piece.frame, surface), weights}});
                 if (isStill)
                     turnAsSheetDoes(query, besideAt(surface), sheetNormal(query, t, weights),
                                     found.back().touch.surface);

@@ -19,10 +19,6 @@ Mat3 transformed(const Frame& frame, const Mat3& triangle) {
     return (frame.linear() * triangle).colwise() + frame.translation();
 }
 
-SurfacePoint placed(const Frame& frame, const SurfacePoint& surface) {
-    return {frame * surface.point, frame.linear() * surface.normal, surface.distance};
-}
-
 }  // namespace
 
 /// What is swept against, in the body's frame.
@@ -70,8 +66,7 @@ class ConcaveTarget final : public SweepTarget {
         for (const TrianglePoint& inside : m_touched)
             if (inside.surface.distance < nearest.surface.distance) nearest = inside;
         if (nearest.surface.distance == reach) return std::nullopt;
-        nearest.surface.point = m_frame * nearest.surface.point;
-        nearest.surface.normal = m_frame.linear() * nearest.surface.normal;
+        nearest.surface = placed(m_frame, nearest.surface);
         return nearest;
     }
     bool isConvex() const override { return false; }
