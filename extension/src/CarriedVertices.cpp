@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "ObjectId.h"
+#include "SolvedIslands.h"
 #include "jacket/Island.h"
 
 namespace jacket::bullet {
@@ -108,13 +109,12 @@ void CarriedVertices::findShifts(const ShellBody& shell, std::span<const Carried
 /// next solve, and so is what bodies at rest stray by: that solve knows the shell's contacts.
 void CarriedVertices::bringAlong(ShellBody& body, const Vec3& gravity, double h) {
     constexpr double kLittle = 0.01;  // of the energy of motion
-    constexpr double kOfFall = 0.2;   // of what falls in a step: bodies that stray by more are solved anew
     Shell& shell = body.m_shell;
     const double moving = energyOfMotion(shell, gravity, h);
     if (strainAlone(shell, true) <= kLittle * moving) return;
     const double before = shell.elasticEnergy(shell.positions());
     if (energyAfter(body, 0.0) <= before + kLittle * moving) return;
-    const double little = kOfFall * h * h * gravity.norm();
+    const double little = kStrayAtRest * h * h * gravity.norm();
     const bool isLittle = std::all_of(m_shifts.begin(), m_shifts.end(), [&](const Shift& shift) {
         return !shift.carried->isTied() || shift.by.norm() < little;
     });

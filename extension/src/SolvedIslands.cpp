@@ -28,10 +28,10 @@ bool isNear(const Shell& shell, const btRigidBody& body, const Vec3& way) {
 /// for what holds it give way. `impulse`: of the solve.
 bool hasStrayed(const btRigidBody& body, double radius, const Vec6& off, const Vec3& impulse, const Vec3& gravity,
                 double h) {
-    constexpr double kOfFall = 0.2, kOfRadius = 1e-3;
+    constexpr double kOfRadius = 1e-3;
     const double give = impulse.norm() * double(body.getInvMass()) / kSupport;
     const double way = h * (off.head<3>().norm() + radius * off.tail<3>().norm());
-    return way > h * (kOfFall * h * gravity.norm() + give) && way > kOfRadius * radius;
+    return way > h * (kStrayAtRest * h * gravity.norm() + give) && way > kOfRadius * radius;
 }
 
 bool isFreeBody(const Obstacle& obstacle) {

@@ -9,6 +9,9 @@
 
 namespace jacket::bullet {
 
+/// Of what falls from rest in a step: bodies at rest stray from what was solved by up to this share of its way.
+inline constexpr double kStrayAtRest = 0.2;
+
 /// Of a body whose solve was taken back.
 struct TakenBack {
     Frame start;   ///< where its motion began
