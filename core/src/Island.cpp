@@ -100,10 +100,12 @@ bool IslandSolver::Impl::isWorthParts() const {
     return isTooLong || ((lastReport.passed || lastReport.mayPass || isLeftDeep) && mayBeShorter);
 }
 
+/// Also where they settled because what went on changing was given up.
 bool IslandSolver::Impl::endsDeep() {
     constexpr double kDeep = 10.0;  // times the contacts' slop
-    if (!unsettled || !mayBeShorter || dynamicBodies.empty()) return false;
-    return response.gapAtEnd({v, endTwists(), unfiltered()}, y) < -kDeep * response.slop();
+    if (!mayBeShorter || dynamicBodies.empty() || response.isQuick()) return false;
+    const double gap = unsettled ? response.gapAtEnd({v, endTwists(), unfiltered()}, y) : response.deepestGap();
+    return gap < -kDeep * response.slop();
 }
 
 void IslandSolver::Impl::solveInParts(const IslandInput& input) {

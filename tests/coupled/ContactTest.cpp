@@ -446,6 +446,16 @@ TEST(Contact, APlatePutRightOnAFreeBoxIsNotThrown) {
         }
 }
 
+/// Strained by being led out, it presses on the box from all sides: nothing of that may turn the box.
+TEST(Contact, APlateThatBeginsDeepInAFreeBoxDoesNotThrowIt) {
+    for (const int cells : {6, 12})
+        for (const double depth : {4e-3, 1e-2}) {
+            const SheetOutcome plate = PlateScene{materials::steel(5e-4), 0.9, cells, kStep, 20.0, 1e-7, -depth}.run();
+            EXPECT_LT(plate.fastest, 2.0) << cells << " cells, " << depth;
+            EXPECT_LT(plate.shoved, 5e-3) << cells << " cells, " << depth;
+        }
+}
+
 TEST(Contact, AClothOfFineMeshGainsNoEnergyFromABox) {
     constexpr double kHalf = 0.083, kGap = 0.02, kSpeed = 2.0;
     Scene scene;
