@@ -100,7 +100,7 @@ bool IslandSolver::Impl::isWorthParts() const {
     return isTooLong || ((lastReport.passed || lastReport.mayPass || isLeftDeep) && mayBeShorter);
 }
 
-/// Also where they settled because what went on changing was given up.
+/// Whether contacts leave shells deep in free bodies: they used up their rounds, or what went on changing was given up.
 bool IslandSolver::Impl::endsDeep() {
     constexpr double kDeep = 10.0;  // times the contacts' slop
     if (!mayBeShorter || dynamicBodies.empty() || response.isQuick()) return false;

@@ -56,7 +56,7 @@ struct IslandSolver::Impl {
     mutable BodyVectors twistsAtEnd;             ///< of the bodies
     BodyVectors momentum;                        ///< of the bodies
     bool unsettled = false;                      ///< contacts of this step have used up their rounds
-    bool isLeftDeep = false;                     ///< and have left shells deep in free bodies
+    bool isLeftDeep = false;                     ///< see endsDeep
     double reference = -1.0;                     ///< r^T P^-1 r that the tolerance refers to; < 0: not known
     int lastRounds = 1;                          ///< changes of the contacts in the last step, and one
     mutable std::vector<double> elasticAtStart;  ///< of each shell at the start of the step; NaN: not yet asked for [J]

@@ -159,7 +159,7 @@ Vec6 IslandSolver::Impl::excessOf(int body, const Vec6& residual) const {
 /// stiff, and its mass would turn little force into much speed, into them. A shell that touches none moves by it.
 void IslandSolver::Impl::shift(const IslandInput& input, std::span<const Vec3> onShells,
                                std::vector<ContactImpulse>& impulses) {
-    system.velocities(u, reached);  // see makePossible
+    system.velocities(u, reached);  // `v` may have been cut short since
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         if (shell.pinCount() > 0) continue;

@@ -117,7 +117,6 @@ TEST_P(BallOnTheFloor, IsBorneByTheSheetBetweenInEveryStep) {
 }
 INSTANTIATE_TEST_SUITE_P(StepsASecond, BallOnTheFloor, ::testing::Values(60.0, 240.0, 480.0, 1000.0));
 
-/// A ball of a thousandth of a vertex' mass, in steps of 1/20 s.
 TEST(Contact, SaysWhenContactsUseUpTheirRounds) {
     Scene scene;  // a box and a ball that leave the sheet no room between them
     scene.addBox(btVector3(1, 1, 1) * btScalar(0.2), 0.0, btVector3(btScalar(0.03), btScalar(0.1), 0));
