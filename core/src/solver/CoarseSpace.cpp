@@ -199,13 +199,12 @@ JACKET_INLINE void addMomentAt(float s, Float4 ri, Float4 rj, float* moments) {
     for (int c = 0; c < 4; ++c) store4(moments + 4 * c, load4(moments + 4 * c) + s * ri[c] * rj);
 }
 
-/// Pairs with a held vertex are left out: near it the shell seems stiffer than it is, which harms less than taking the
-/// trouble.
+/// What is held is taken as held in all directions: near it the shell seems stiffer than it is, which harms less than
+/// taking the trouble. Its pairs with others stay, or what bending has, which is of both signs, would not be positive.
 template <class Column>
 JACKET_KERNEL void addScalars(const Galerkin& g, const Column* besideColumn, int patch) {
     Float4 own[4] = {};
     double ownSum = 0.0;
-    const auto unlessHeld = [&](int k) { return g.isHeld[besideColumn[k]] ? 0.0f : g.beside[k]; };
     for (int m = g.patchStart[patch]; m < g.patchStart[patch + 1]; ++m) {
         const int i = g.members[m];
         if (m + kAhead < g.patchStart[patch + 1]) {
@@ -214,7 +213,7 @@ JACKET_KERNEL void addScalars(const Galerkin& g, const Column* besideColumn, int
             prefetch(besideColumn + g.besideStart[next], besideColumn + g.besideStart[next + 1]);
             prefetch(g.scalars + g.scalarStart[next], g.scalars + g.scalarStart[next + 1]);
         }
-        if (g.isHeld[i]) continue;
+        const bool isHeld = g.isHeld[i];
         const Float4 ri = load4(g.arms + 4 * i);
         float crossSum = 0.0f;  // of scalars to other patches
         const int first = g.besideStart[i];
@@ -222,24 +221,36 @@ JACKET_KERNEL void addScalars(const Galerkin& g, const Column* besideColumn, int
         const std::uint16_t* const ownEnd = at + 2 + at[0];
         int places = at[1];
         for (at += 2; at < ownEnd; ++at) {
-            const int k = first + *at;
-            const Float4 arm = load4(g.arms + 4 * besideColumn[k]) - ri;
-            addMoment(-unlessHeld(k), arm, arm, own);
+            const int j = besideColumn[first + *at];
+            const float s = g.beside[first + *at];
+            const Float4 rj = load4(g.arms + 4 * j);
+            if (!isHeld && !g.isHeld[j]) {
+                addMoment(-s, rj - ri, rj - ri, own);
+            } else if (!isHeld || !g.isHeld[j]) {
+                addMoment(-s, isHeld ? rj : ri, isHeld ? rj : ri, own);
+                ownSum -= s;
+            }
         }
+        if (isHeld) continue;
         for (; places > 0; --places) {
             const int target = at[0] | at[1] << 16;
             const std::uint16_t* const end = at + 3 + at[2];
             Float4 sum{};  // of s (r_j, 1)
+            float toHeld = 0.0f;
             for (at += 3; at < end; ++at) {
-                const int k = first + *at;
-                sum += unlessHeld(k) * load4(g.arms + 4 * besideColumn[k]);
+                const int j = besideColumn[first + *at];
+                const float s = g.beside[first + *at];
+                if (g.isHeld[j])
+                    toHeld += s;
+                else
+                    sum += s * load4(g.arms + 4 * j);
             }
-            crossSum -= sum[3];
+            crossSum -= sum[3] + toHeld;
             addMomentAt(1.0f, ri, sum, g.moments + kMoments * target);
             g.besideSums[target] += sum[3];
         }
         for (const std::uint16_t* const end = g.scalars + g.scalarStart[i + 1]; at < end; ++at)
-            crossSum -= unlessHeld(first + *at);
+            crossSum -= g.beside[first + *at];
         ownSum += crossSum;
         addMoment(crossSum, ri, ri, own);
     }
