@@ -258,7 +258,9 @@ JACKET_KERNEL void addScalars(const Galerkin& g, const Column* besideColumn, int
     g.besideSums[patch] = ownSum;
 }
 
-/// P^T A P's part of a row that is held, or next to one that is.
+/// P^T A P's part of a row that is held, or next to one that is. What is held keeps its mass, which is what the blocks
+/// of its row add up to: where all but a few of a patch' vertices are held, rounding is else all that resists motions
+/// that move these few by nothing, and once a contact has let go P^-1 makes 1e10 times too much of them.
 void addHeldRow(const Galerkin& g, int i, const std::vector<const Mat3*>& free) {
     using Block = Eigen::Matrix3f;
     const auto projector = [&](int row) -> Block {
@@ -272,6 +274,7 @@ void addHeldRow(const Galerkin& g, int i, const std::vector<const Mat3*>& free) 
     };
     const Block si = projector(i);
     Block own = Eigen::Map<const Block>(g.rowSums + 9 * i);
+    const float mass = std::max(0.0f, own.trace() / 3.0f);
     double* ownSums = g.sums + kSums * g.patchOf[i];
     const auto addPair = [&](int j, int k, const Block& block) {
         own -= block;
@@ -284,6 +287,7 @@ void addHeldRow(const Galerkin& g, int i, const std::vector<const Mat3*>& free) 
     for (int k = p.upperStart[i]; k < p.upperStart[i + 1]; ++k)
         addPair(p.upperColumn[k], p.upperBlock[k], blockAt(p.upperBlock[k]).transpose());
     add(si * own * si, i, ownSums);
+    if (free[i]) add(mass * (Block::Identity() - si), i, ownSums);
 }
 
 }  // namespace
