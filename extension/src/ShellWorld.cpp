@@ -407,7 +407,7 @@ void ShellWorld::solveIsland(Island& island, double h, SolvedIslands* islands) {
     input.rigidContacts = island.rigidContacts;
     input.anchors = island.anchors;
     input.contacts = island.pairs.empty() ? nullptr : &timed;
-    input.isCalm = !m_impl->hasWind && Sleepers::isCalm(island, input.gravity);
+    input.isCalm = !m_impl->hasWind && Sleepers::isCalm(island, input.gravity, h);
     for (ShellBody* shell : island.shells) shell->m_rest->damped = input.isCalm ? shell->m_rest->damped + h : 0.0;
     input.inOnePiece = std::any_of(island.obstacles.begin(), island.obstacles.end(), [](const Obstacle& obstacle) {
         return !obstacle.body.prescribed && !btRigidBody::upcast(obstacle.object);

@@ -42,10 +42,11 @@ bool mayFallAsleep(const btCollisionObject& object) {
     return sleeps(object) || object.getDeactivationTime() >= btScalar(kMostWait) * gDeactivationTime;
 }
 
-/// Whether it never moves, or has not moved for a while.
-bool isQuiet(const btCollisionObject& object) {
-    if (!mayBePushed(object)) return standsStill(object);
-    return btRigidBody::upcast(&object) && mayFallAsleep(object);
+/// Whether what shells cannot push stays where it is from one pose to the next.
+bool stays(const btCollisionObject& object, const Frame& from, const Frame& to) {
+    constexpr double kMost = 1e-6;  // [m, rad]
+    const bool isSame = (from.matrix() - to.matrix()).cwiseAbs().maxCoeff() < kMost;
+    return standsStill(object) || (isLed(object) && isSame);
 }
 
 /// Whether a rigid contact or a joint of an island bears one of its bodies on another one.
@@ -55,12 +56,13 @@ bool liesOnAnother(const Island& island, int body, const Vec3& gravity) {
     });
 }
 
-/// Whether it never moves, or is borne by rigid contacts and stands on them. (Of bodies that are borne by one another
+/// Whether it does not move, or is borne by rigid contacts and stands on them. (Of bodies that are borne by one another
 /// the lowest one has another support.)
-bool stands(const Island& island, int body, const Vec3& gravity) {
+bool stands(const Island& island, int body, const Vec3& gravity, double h) {
     const Obstacle& obstacle = island.obstacles[body];
     const CoupledBody& coupled = obstacle.body;
-    if (!mayBePushed(*obstacle.object)) return standsStill(*obstacle.object);
+    if (!mayBePushed(*obstacle.object))
+        return stays(*obstacle.object, obstacle.start, moved(obstacle.start, coupled.freeTwist, h));
     return coupled.startTwist.head<3>().norm() < kSlow &&
            coupled.radius * coupled.startTwist.tail<3>().norm() < kSlow &&
            (!coupled.supports.empty() || liesOnAnother(island, body, gravity));
@@ -250,6 +252,12 @@ bool Sleepers::keepsPlace(ShellBody& shell, double h) const {
     return rest.quiet >= double(gDeactivationTime) || rest.damped >= 2.0 * waitForCalm();
 }
 
+/// Whether it has not moved in the last step, or, if shells can push it, for a while.
+bool Sleepers::isQuiet(const btCollisionObject& object, double h) const {
+    if (mayBePushed(object)) return btRigidBody::upcast(&object) && mayFallAsleep(object);
+    return stays(object, m_obstacles.startOf(object, h), fromBullet(object.getWorldTransform()));
+}
+
 void Sleepers::followEnergy(const Candidate& candidate, const Vec3& gravity, double h) const {
     ShellRest& rest = *candidate.shell->m_rest;
     const Shell& shell = candidate.shell->shell();
@@ -259,7 +267,7 @@ void Sleepers::followEnergy(const Candidate& candidate, const Vec3& gravity, dou
     const double waited = std::exchange(rest.level, 0.0);
     if (!isAsBefore || !candidate.shell->options().sleeping || candidate.supports.empty() ||
         !std::all_of(candidate.supports.begin(), candidate.supports.end(),
-                     [](const btCollisionObject* object) { return isQuiet(*object); }))
+                     [&](const btCollisionObject* object) { return isQuiet(*object, h); }))
         return;
     const double weightTimesSide = shell.masses().sum() * gravity.norm() * shell.side();
     const double kinetic = shell.kineticEnergy();
@@ -271,7 +279,7 @@ void Sleepers::followEnergy(const Candidate& candidate, const Vec3& gravity, dou
     rest.level = (hasFallen ? 0.0 : waited) + h;
 }
 
-bool Sleepers::isCalm(const Island& island, const Vec3& gravity) {
+bool Sleepers::isCalm(const Island& island, const Vec3& gravity, double h) {
     const double wait = waitForCalm();
     const auto isLevel = [&](const ShellBody* shell) {
         return shell->options().sleeping && shell->m_rest->level >= wait;
@@ -280,7 +288,7 @@ bool Sleepers::isCalm(const Island& island, const Vec3& gravity) {
         !std::all_of(island.shells.begin(), island.shells.end(), isLevel))
         return false;
     for (int b = 0; b < std::ssize(island.obstacles); ++b)
-        if (!stands(island, b, gravity)) return false;
+        if (!stands(island, b, gravity, h)) return false;
     return true;
 }
 

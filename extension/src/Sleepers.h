@@ -48,10 +48,10 @@ class Sleepers {
     void rest(const Vec3& gravity, double h);
     /// Together with the bodies that it touched.
     void wakeUp(ShellBody& shell);
-    /// Whether an island's shells are slow, have bodies around them that never move, or stand, and lose no energy: what
-    /// moves them still is what the solves of contacts leave over, as vertices go on leaving a body and coming back to
-    /// it. What truly falls, slides or swings loses some.
-    static bool isCalm(const Island& island, const Vec3& gravity);
+    /// Whether an island's shells are slow, have bodies around them that do not move, or stand, and lose no energy:
+    /// what moves them still is what the solves of contacts leave over, as vertices go on leaving a body and coming
+    /// back to it. What truly falls, slides or swings loses some.
+    static bool isCalm(const Island& island, const Vec3& gravity, double h);
 
   private:
     struct Candidate {
@@ -60,6 +60,7 @@ class Sleepers {
         bool ready;
         std::pmr::vector<btCollisionObject*> company;  ///< what sleeps with it, if it is ready
     };
+    bool isQuiet(const btCollisionObject& object, double h) const;
     bool keepsPlace(ShellBody& shell, double h) const;
     void followEnergy(const Candidate& candidate, const Vec3& gravity, double h) const;
     void dropRestless(std::span<Candidate> candidates) const;

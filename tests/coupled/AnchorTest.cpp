@@ -490,23 +490,31 @@ TYPED_TEST(Teleport, TakesAlongWhatIsTiedToAFreeBody) {
     }
 }
 
-/// Bullet takes a kinematic body to the end of a frame in its first substep. The cape hangs on it as if it went evenly.
-TEST(Anchors, FollowAWalkerInManySubstepsAsEvenly) {
+/// Bullet takes a kinematic body to the end of a frame in its first substep, or evenly. By how much its cape then hangs
+/// otherwise [m].
+double offByEvenWalk(double speed) {
     constexpr int kSubsteps = 4;
+    Wearer<btDiscreteDynamicsWorld> led;
+    Wearer<ShellDynamicsWorld<>> evenlyLed;
+    const auto walk = [&](auto& wearer) {
+        wearer.take(btVector3(0, 0, btScalar(speed * kSubsteps * kStep)));
+        wearer.world.stepSimulation(btScalar(kSubsteps * kStep), kSubsteps + 1, btScalar(kStep));
+    };
+    const auto before = led.worn();
+    for (int frame = 0; frame < 15; ++frame) {
+        walk(led);
+        walk(evenlyLed);
+        EXPECT_LT(distance(before, led.worn(), led.top()), kAtAnchor) << speed << " m/s, frame " << frame;
+    }
+    return distance(led.worn(), evenlyLed.worn());
+}
+
+/// At 30 m/s a cape flutters, and one start says nothing.
+TEST(Anchors, FollowAWalkerInManySubstepsAsEvenly) {
     for (const double speed : {2.0, 10.0, 30.0}) {
-        Wearer<btDiscreteDynamicsWorld> led;
-        Wearer<ShellDynamicsWorld<>> evenlyLed;
-        const auto walk = [&](auto& wearer) {
-            wearer.take(btVector3(0, 0, btScalar(speed * kSubsteps * kStep)));
-            wearer.world.stepSimulation(btScalar(kSubsteps * kStep), kSubsteps + 1, btScalar(kStep));
-        };
-        const auto before = led.worn();
-        for (int frame = 0; frame < 15; ++frame) {
-            walk(led);
-            walk(evenlyLed);
-            ASSERT_LT(distance(before, led.worn(), led.top()), kAtAnchor) << speed << " m/s, frame " << frame;
-        }
-        EXPECT_LT(distance(led.worn(), evenlyLed.worn()), 0.01) << speed << " m/s";
+        std::vector<double> off;
+        for (int start = 0; start < 5; ++start) off.push_back(offByEvenWalk((1.0 + 1e-3 * start) * speed));
+        EXPECT_LT(medianOf(off), 0.01) << speed << " m/s";
     }
 }
 

@@ -88,6 +88,17 @@ TEST_P(Drape, FallsAsleep) {
 }
 INSTANTIATE_TEST_SUITE_P(Shapes, Drape, ::testing::Values("box", "sphere", "cylinder", "capsule"));
 
+/// What only its user moves, and does not, is as good as what never moves.
+TEST(Sleeping, AClothFallsAsleepOnAKinematicBodyAtRest) {
+    for (const std::string name : {"box", "sphere", "capsule"})
+        for (const double aside : {0.0, 0.011, 0.037}) {
+            Scene scene;
+            makeKinematic(scene.addBody(thingToDrape(name), 0.0, btVector3(btScalar(aside), btScalar(-0.32), 0)));
+            const ShellBody& cloth = scene.shells->add(sheetAt(1.0, 10, 0.0), materials::cotton());
+            EXPECT_GT(timeToSleep(scene, cloth, 20.0), 1.0) << name << ", " << aside << " m aside";
+        }
+}
+
 /// What is at rest but for noise is damped, not what begins to move: when gravity turns, a cloth that hangs over a ball
 /// slides about as far as one that is never damped. On average: by its folds one slides 9 cm and another 19.
 TEST(Sleeping, AClothThatHasCalmedDownIsAsFreeAsBefore) {
