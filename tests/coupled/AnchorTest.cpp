@@ -509,11 +509,12 @@ double offByEvenWalk(double speed) {
     return distance(led.worn(), evenlyLed.worn());
 }
 
-/// At 30 m/s a cape flutters, and one start says nothing.
+/// At 30 m/s a cape flutters, one in five by more than the bound: a few starts say nothing.
 TEST(Anchors, FollowAWalkerInManySubstepsAsEvenly) {
+    constexpr int kStarts = 21;
     for (const double speed : {2.0, 10.0, 30.0}) {
         std::vector<double> off;
-        for (int start = 0; start < 5; ++start) off.push_back(offByEvenWalk((1.0 + 1e-3 * start) * speed));
+        for (int start = 0; start < kStarts; ++start) off.push_back(offByEvenWalk((1.0 + 1e-3 * start) * speed));
         EXPECT_LT(medianOf(off), 0.01) << speed << " m/s";
     }
 }
