@@ -53,12 +53,16 @@ const StepReport& IslandSolver::solve(const IslandInput& input) {
 }
 
 void IslandSolver::Impl::solve(const IslandInput& input) {
-    mayBeShorter = StepParts::areAllowed(input);
+    const auto isFree = [](const CoupledBody& body) { return !body.prescribed; };
+    if (std::any_of(input.bodies.begin(), input.bodies.end(), isFree)) patience = {};
+    mayBeShorter = StepParts::areAllowed(input) && !patience.isOut();
     attempt(input);
     if (isWorthParts())
         solveInParts(input);
     else
         store(input);
+    patience.endStep();
+    pushShare = std::min(1.0, 2.0 * pushShare);
 }
 
 /// Everything but what others would see of it.
@@ -74,11 +78,9 @@ void IslandSolver::Impl::attempt(const IslandInput& input) {
     beginContacts(input);
     lap.addTo(times.contact);
     solveStep(input, report);  // A, b; filtered PCG until the contacts agree
+    if (isTooLong && partOfStep == 1.0 && response.isAnyTakenOut()) pushLess(input, report);
     if (!isTooLong && !report.limited && pushesStrain(input)) {
-        givesWay = false;
-        stepsInFull = 0;
-        gather(input);
-        beginContacts(input);
+        beginInFull(input);
         solveStep(input, report);
     }
     report.times = times;
@@ -92,6 +94,19 @@ void IslandSolver::Impl::attempt(const IslandInput& input) {
     closing.addTo(report.times.contact);
     report.settled = !unsettled;
     report.mayPass = response.hasFastBody() && (report.limited || unsettled);
+}
+
+/// What takes shells out of walls may be what makes the step too long: out of something round their edges would go by
+/// many times the depth, as the linear solve has it. Less is as good, it only takes more steps.
+void IslandSolver::Impl::pushLess(const IslandInput& input, StepReport& report) {
+    constexpr double kLess = 0.25, kLeast = 0.01;
+    do {
+        if (!response.isQuick()) pushShare *= kLess;
+        isTooLong = unsettled = false;
+        beginInFull(input);
+        solveStep(input, report);
+    } while (isTooLong && pushShare > kLeast);
+    if (isTooLong) pushShare = 1.0;
 }
 
 /// Whether contacts with a fast body did not settle in the whole of a step, or Newton's method, or what did not leaves
@@ -109,6 +124,7 @@ bool IslandSolver::Impl::endsDeep() {
 }
 
 void IslandSolver::Impl::solveInParts(const IslandInput& input) {
+    constexpr int kMostSolves = 1000;
     StepParts step(input, lastReport);
     while (!step.areDone()) {
         partOfStep = step.next().h / input.h;
@@ -120,6 +136,7 @@ void IslandSolver::Impl::solveInParts(const IslandInput& input) {
         }
         store(step.next());
         step.add(lastReport);
+        if (isAmongWalls(input) && step.report().solves > kMostSolves) patience.workedInVain();
     }
     partOfStep = 1.0;
     lastReport = step.report();
@@ -169,10 +186,19 @@ void IslandSolver::Impl::gather(const IslandInput& input) {
     expected = start + lastChange;
 }
 
+/// A step, or a try at it, in which shells do not give way: see pushesStrain.
+void IslandSolver::Impl::beginInFull(const IslandInput& input, bool onlyStops) {
+    givesWay = false;
+    stepsInFull = 0;
+    gather(input);
+    beginContacts(input, onlyStops);
+}
+
 /// Those at the start of the step, and y.
 void IslandSolver::Impl::beginContacts(const IslandInput& input, bool onlyStops) {
     response.begin(input,
-                   {offsets, dynamicIndex, stepOf, isAnyFactored(), givesWay, mayBeShorter, partOfStep, onlyStops},
+                   {offsets, dynamicIndex, stepOf, isAnyFactored(), givesWay, mayBeShorter, patience.isOut(),
+                    partOfStep, pushShare, onlyStops},
                    expected, y);
     givesWay = givesWay || !response.hasContacts();
 }

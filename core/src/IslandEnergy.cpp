@@ -82,7 +82,8 @@ double IslandSolver::Impl::energyOfMotion(const IslandInput& input, std::size_t 
 /// that they start with, or that gravity gives what starts from rest.
 double IslandSolver::Impl::energyGain(const IslandInput& input) const {
     if (input.wind) return 0.0;  // what wind and pressure give is not known
-    double atStart = 0.0, gain = 0.0, pushed = 0.0, mass = 0.0;
+    const double out = partOfStep * response.workOut();
+    double atStart = 0.0, gain = -out, pushed = -out, mass = 0.0;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
         const Shell& shell = *input.shells[k];
         const int n = shell.vertexCount();

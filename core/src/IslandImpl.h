@@ -18,6 +18,28 @@ namespace jacket {
 
 using BodyVectors = Eigen::Matrix<double, 6, Eigen::Dynamic>;  ///< twists or momenta
 
+/// Steps among walls that settle in no part of them, as in a sheet between bodies that overlap, cost thousands of
+/// solves and come to nothing. After one that did, the next ones are not worth that much: twice as many each time.
+class Patience {
+  public:
+    bool isOut() const { return m_left > 0; }
+    void workedInVain() {
+        if (isOut()) return;
+        m_wait = std::clamp(2 * m_wait, 1, kMostSteps);
+        m_left = m_wait + 1;
+    }
+    void endStep() {
+        if (isOut())
+            --m_left;
+        else
+            m_wait = 0;
+    }
+
+  private:
+    static constexpr int kMostSteps = 256;
+    int m_wait = 0, m_left = 0;  ///< [steps], with the present one
+};
+
 /// What an island's step knows and does. A file for each group of functions.
 struct IslandSolver::Impl {
     static constexpr double kEnergyGain = 0.02;     ///< of a step that is linearised again: see energyGain
@@ -41,6 +63,7 @@ struct IslandSolver::Impl {
     std::vector<char> factored;      ///< shells: completely
     bool mayBeShorter = false;       ///< the step that is being solved
     bool isTooLong = false;          ///< the step that was attempted, to be solved
+    Patience patience;               ///< among walls
     bool givesWay = true;            ///< false for as long as wouldBeStrained says: see pushesStrain
     int stepsInFull = 0;             ///< that have been taken since givesWay became false
     Points lastChange;               ///< dv of the last step
@@ -63,6 +86,7 @@ struct IslandSolver::Impl {
     mutable std::vector<double> energyMemory;    ///< see Energy::valueBeside
     StepTimes times;                             ///< of the step so far
     StepReport lastReport;
+    double pushShare = 1.0;         ///< of what moves shells out of bodies at once: see pushLess
     double partOfStep = 1.0;        ///< that is being solved: what a step may gain, its parts may together
     double impulseShare = 1.0;      ///< of the solved contacts that a step cut short takes: see limitDeformation
     std::vector<double> bodyShare;  ///< of that, what each dynamic body takes: see limitBodies
@@ -77,11 +101,13 @@ struct IslandSolver::Impl {
     // Island.cpp: the course of a step, from what is given to what is stored
     void solve(const IslandInput& input);
     void attempt(const IslandInput& input);
+    void pushLess(const IslandInput& input, StepReport& report);
     bool isWorthParts() const;
     bool endsDeep();
     void solveInParts(const IslandInput& input);
     void clearReport();
     void gather(const IslandInput& input);
+    void beginInFull(const IslandInput& input, bool onlyStops = false);
     void beginContacts(const IslandInput& input, bool onlyStops = false);
     void beginTwoStep(const IslandInput& input, std::size_t shell);
     void store(const IslandInput& input);

@@ -32,7 +32,7 @@ bool isHeldInSome(const Mat6& mass) {
 void IslandSolver::Impl::limitDeformation(const IslandInput& input, StepReport& report) {
     constexpr int kMostHalvings = 40;
     report.limited = true;
-    limitPushes(input, kMostEnergyGain);
+    limitPushes(input, patience.isOut() ? 0.0 : kMostEnergyGain);
     const double most = std::max(kEnergyGain, gainOfCoasting(input));
     rigid = v;
     makeRigid(input, rigid, input.h);
@@ -60,7 +60,7 @@ void IslandSolver::Impl::limitPushes(const IslandInput& input, double mostGain) 
     makeRigid(input, reached, 1.0);
     rigid = start.colwise() + input.h * input.gravity;
     makeRigid(input, rigid, input.h);
-    double most = 0.0;
+    double most = partOfStep * response.workOut();
     for (std::size_t k = 0; k < input.shells.size(); ++k)
         most += elasticAtStart[k] + partOfStep * mostGain * (elasticAtStart[k] + energyOfMotion(input, k));
     const auto energyAfter = [&] {

@@ -35,7 +35,7 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
     const bool toTheEnd = std::any_of(input.shells.begin(), input.shells.end(), [](const Shell* shell) {
         return shell->settings().integrator != Integrator::BackwardEuler;
     });
-    const int most = toTheEnd ? kMostToTheEnd : kMostNewtonSteps;
+    const int most = toTheEnd ? kMostToTheEnd : patience.isOut() ? 1 : kMostNewtonSteps;
     double leastGain = std::numeric_limits<double>::infinity();
     int calmestStep = 1;
     assemble(input, false);
@@ -65,7 +65,7 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
     if (!unfiltered().allFinite()) return;
     if (isAmongWalls(input) && energyGain(input) > partOfStep * kEnergyGainAlone) {
         isTooLong = mayBeInParts();
-        if (isTooLong || descend(input, report)) return;
+        if (isTooLong || (!patience.isOut() && descend(input, report))) return;
     }
     if (energyGain(input) > partOfStep * mostGain) limitDeformation(input, report);
 }
@@ -86,10 +86,7 @@ bool IslandSolver::Impl::mayBeInParts() const {
 bool IslandSolver::Impl::descend(const IslandInput& input, StepReport& report) {
     constexpr int kMostSteps = 20, kMostHalvings = 20;
     constexpr double kSettled = 1e-3;  // of what the first step brings
-    givesWay = false;
-    stepsInFull = 0;
-    gather(input);
-    beginContacts(input, true);
+    beginInFull(input, true);
     for (std::size_t k = 0; k < input.shells.size(); ++k)
         elasticAtStart[k] = input.shells[k]->elasticEnergy(input.shells[k]->positions());
     limitPushes(input, kEnergyGain);

@@ -137,6 +137,46 @@ TEST(Contact, SaysWhenContactsUseUpTheirRounds) {
     EXPECT_EQ(calm.shells->lastStep().unsettledSteps, 0);
 }
 
+/// Leaves the way out where linear solves see it go by many times its depth, and must strain a sheet that was flat.
+TEST(Contact, ASheetThatBeginsDeepInAFixedBallComesOutOfIt) {
+    for (const ShellMaterial& material : {trampolineCloth(), materials::rubber()}) {
+        Scene scene;
+        const auto& ball = scene.addSphere(0.25, 0.0, btVector3(btScalar(-0.02), btScalar(-0.1), btScalar(0.05)));
+        auto& sheet = scene.shells->add(squareSheet(2, 12), material);
+        pinBorder(sheet);
+        int solves = 0;
+        double fastest = 0.0;
+        for (int i = 0; i < 120; ++i) {
+            scene.step(kStep);
+            solves += scene.shells->lastStep().solves;
+            fastest = std::max(fastest, sheet.shell().velocities().colwise().norm().maxCoeff());
+        }
+        EXPECT_LT(penetration(sheet, ball), 1e-4) << material.young;
+        EXPECT_LT(fastest, 3.0) << material.young;
+        EXPECT_LT(solves, 2000) << material.young;  // of 70000 that every step's parts would take
+    }
+}
+
+/// Nothing settles that. It is not torn apart, falls asleep, and costs no more than that is worth.
+TEST(Contact, ASheetBetweenBodiesThatOverlapIsLeftWhereItIs) {
+    Scene scene;
+    scene.addSphere(0.25, 0.0, btVector3(btScalar(0.03), btScalar(0.1), 0));
+    scene.addSphere(0.25, 0.0, btVector3(btScalar(-0.02), btScalar(-0.1), btScalar(0.05)));
+    auto& sheet = scene.shells->add(squareSheet(2, 12), trampolineCloth());
+    pinBorder(sheet);
+    int solves = 0;
+    double fastest = 0.0;
+    for (int i = 0; i < 200; ++i) {
+        scene.step(0.05);
+        solves += scene.shells->lastStep().solves;
+        fastest = std::max(fastest, sheet.shell().velocities().colwise().norm().maxCoeff());
+    }
+    EXPECT_LT(solves, 10000);  // of 400000 that every step's parts would take
+    EXPECT_LT(fastest, 3.0);
+    EXPECT_LT(sheet.shell().elasticEnergy(sheet.shell().positions()), 10.0);
+    EXPECT_TRUE(sheet.isAsleep());
+}
+
 /// Bodies smaller than a triangle, or with corners that are, on a sheet of coarse cells.
 class SmallBody : public ::testing::TestWithParam<std::tuple<const char*, double>> {};
 

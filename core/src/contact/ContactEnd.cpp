@@ -10,7 +10,6 @@ constexpr double kMostOffset =
     0.15;                            // of an edge: how far vertices are lifted off a curved body for their chords' sake
 constexpr double kDeep = 0.1;        // of an edge: what is worth another solve where few are made
 constexpr double kMostPush = 0.2;    // of an edge: how far pushOut goes
-constexpr double kLeastFree = 0.25;  // see freeWeights(): what is mostly held is not pushed
 constexpr int kMostTurns = 8;        // of the walls of a valley, at pushing
 constexpr double kSamePoint = 0.15;  // of an edge, or the body's radius: how far it may move in a round
 constexpr double kSameWay = 0.7;     // cosine of the angle between normals that push a vertex much the same way
@@ -222,7 +221,7 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     if (!fresh && !held && m_touches[known].changes >= kMostChanges) return false;
     if (isNewFace) {
         // Of features that share vertices the deepest comes first, for the others may be cured with it.
-        if (!m_onlyStops && liftVertices(contact, -lacks, solved)) return true;
+        if (!m_onlyStops && !isTakenOut(contact.body) && liftVertices(contact, -lacks, solved)) return true;
         for (int a = 0; a < 3; ++a)
             if (contact.weights[a] > 0.0 && m_claimed.count(globalVertex(contact, a))) return true;
         for (int a = 0; a < 3; ++a)
@@ -264,7 +263,8 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
 /// Whether what stood inside the body at the start is taken out of it by and by. In the short time that is a part of a
 /// step a face that leaves at once would throw the shell, or the body.
 bool ContactResponse::leavesSlowly(const Contact& contact) const {
-    return isBacked(contact) || (m_partOfStep < 1.0 && !isLed(contact.body) && !contact.isVertex());
+    const bool isInPart = m_partOfStep < 1.0 && !isLed(contact.body);
+    return isBacked(contact) || (!contact.isVertex() && (isInPart || isTakenOut(contact.body)));
 }
 
 /// Sets what a contact where the end found it is to reach. `lacks`: see missing.
@@ -277,7 +277,7 @@ void ContactResponse::aim(Touch& touch, double lacks, const IslandVelocities& so
     if (leavesSlowly(contact)) {  // from where it really is: each end of a body that lies aslant has its own depth
         double start = before + touch.allowedGap;
         // No deeper than anything was: beside a round body that goes far, what is outside seems to come from inside.
-        if (m_partOfStep < 1.0) start = std::max(start, m_gapAtStart[contact.body]);
+        if (m_partOfStep < 1.0 || isTakenOut(contact.body)) start = std::max(start, m_gapAtStart[contact.body]);
         const double out = m_input.h * speedOutOf(-start, contact);
         take = lacks + touch.allowedGap - (start < 0.0 ? std::min(0.0, start + out) : 0.0);
     }

@@ -20,6 +20,10 @@ constexpr double kSameContact = 0.3;       // of an edge: how far the point of a
 using Normals = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3>;
 using Shares = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
 
+double lengthOf(const HalfEdgeMesh::Edge& edge, const Points& x) {
+    return (x.col(edge.v0) - x.col(edge.v1)).norm();
+}
+
 /// What each of up to three normals takes of an impulse, by least squares.
 Shares sharesOf(const Vec3& impulse, const Normals& normals) {
     using Gram = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
@@ -136,12 +140,13 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     m_touches.clear();
     m_index.clear();
     m_forgotten.clear();
-    m_deepestGap = 0.0;
+    m_deepestGap = m_workOut = 0.0;
     m_frictionRounds = 0;
     m_mostFrictionRounds = m_memory.empty() ? kFrictionRounds : kFrictionRoundsGoingOn;
     m_anyFast = false;
     m_onlyStops = numbering.onlyStops;
     m_partOfStep = numbering.partOfStep;
+    m_pushShare = numbering.pushShare;
     m_held.assign(y.cols(), 0);
     m_filters.clear();
     m_filterOf.assign(y.cols(), -1);
@@ -184,7 +189,8 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
     findFast();
     if (isQuick() && (isAnyBouncy() || m_anyFast)) m_care = inFull;
     if (m_anyFast) sweepAtStart();
-    if (m_anyFast && numbering.mayBeShorter && !hasFreeBodies() && !isAnyBouncy()) m_care = kInPassing;
+    const bool isInPassing = m_anyFast && numbering.mayBeShorter && !hasFreeBodies() && !isAnyBouncy();
+    if (isInPassing || numbering.isInVain) m_care = kInPassing;
     keepEarliest();
 }
 
@@ -232,9 +238,48 @@ void ContactResponse::findAtStart(double reach) {
     const bool isBesidePin = !areSurfaces && mayBeBacked();
     if (!areSurfaces && (isBesidePin || isAnyComing)) find(reach);
     if (areSurfaces || isBesidePin) findBacked();
+    findGapsAtStart();
+    m_slack.clear();
+    if (!isAnyTakenOut()) return;
+    findSlack();
+    if (wantsFaces) return;
+    find(10.0 * m_vertexSlop);
+    findGapsAtStart();
+}
+
+/// Of each vertex how far its edges are from being strained by as much as taking shells out of bodies may bring about:
+/// as if all of the shell were, and had its energy from a fall as deep as it is wide. What stands on both sides of a
+/// body's middle would else be pulled apart, until it snaps.
+void ContactResponse::findSlack() {
+    constexpr double kMostStrain = 0.05;
+    m_slack.assign(m_expected->cols(), 1.0);
+    for (std::size_t k = 0; k < m_input.shells.size(); ++k) {
+        const Shell& shell = *m_input.shells[k];
+        const double ofFall = shell.material().areaDensity() * weightOf(1.0) * shell.side();
+        const double most = std::min(kMostStrain, std::sqrt(2.0 * ofFall / shell.material().stretchStiffness()));
+        for (const HalfEdgeMesh::Edge& edge : shell.mesh().edges()) {
+            const double strain = lengthOf(edge, shell.positions()) / lengthOf(edge, shell.restPositions()) - 1.0;
+            for (const int vertex : {edge.v0, edge.v1}) {
+                double& slack = m_slack[m_offsets[k] + vertex];
+                slack = std::clamp(1.0 - strain / most, 0.0, slack);
+            }
+        }
+    }
+}
+
+double ContactResponse::slackAt(const Contact& contact) const {
+    double least = 1.0;
+    for (int a = 0; a < (contact.isVertex() ? 1 : 3) && !m_slack.empty(); ++a)
+        least = std::min(least, m_slack[globalVertex(contact, a)]);
+    return least;
+}
+
+/// The deepest of each body.
+void ContactResponse::findGapsAtStart() {
     m_gapAtStart.assign(m_input.bodies.size(), 0.0);
     for (const Contact& contact : m_found)
-        m_gapAtStart[contact.body] = std::min(m_gapAtStart[contact.body], contact.gap);
+        if (freeWeights(contact) > kLeastFree)
+            m_gapAtStart[contact.body] = std::min(m_gapAtStart[contact.body], contact.gap);
 }
 
 /// Takes out of what was found the vertices that are anchored to the body that they touch, and what is nearly at one:
@@ -418,14 +463,28 @@ bool ContactResponse::isLed(int body) const {
     return m_input.bodies[body].prescribed && !m_input.bodies[body].freeTwist.isZero(0.0);
 }
 
+/// Whether the shells begin the step deep in a body that stays where it is, among walls: they are taken out of it
+/// little by little, and their faces are not to leave it at once.
+bool ContactResponse::isTakenOut(int body) const {
+    constexpr double kDeep = 20.0;  // times the contacts' slop
+    return m_gapAtStart[body] < -kDeep * m_vertexSlop && !hasFreeBodies() && !isLed(body);
+}
+
+bool ContactResponse::isAnyTakenOut() const {
+    for (int b = 0; b < std::ssize(m_gapAtStart); ++b)
+        if (isTakenOut(b)) return true;
+    return false;
+}
+
 /// Of a penetration. Where bodies are free the parts of a step take back as much together as a whole one: as much in
 /// each of them, in its short time, would throw the bodies, and strain what lies between them. What a body that its
 /// user moves has gone into is taken back sooner, for it goes on; and so is sheet metal, which each part that it stays
 /// inside strains.
 double ContactResponse::shareTakenBack(const Contact& contact) const {
-    const bool isPart = m_partOfStep < 1.0 && hasFreeBodies() && !isLed(contact.body);
-    if (!isPart || m_input.shells[contact.shell]->isStiffAsAWhole(m_input.h / m_partOfStep)) return kAlteration;
-    return 1.0 - std::pow(1.0 - kAlteration, m_partOfStep);
+    const bool isPart = m_partOfStep < 1.0 && (hasFreeBodies() || isTakenOut(contact.body)) && !isLed(contact.body);
+    const double share = m_pushShare * slackAt(contact) * kAlteration;
+    if (!isPart || m_input.shells[contact.shell]->isStiffAsAWhole(m_input.h / m_partOfStep)) return share;
+    return 1.0 - std::pow(1.0 - share, m_partOfStep);
 }
 
 /// With which a free body leaves a surface that it stands inside and that cannot give way [m/s]: in steps that take
@@ -535,7 +594,7 @@ double ContactResponse::timeOfTouch(const Touch& touch) const {
 
 /// What stands inside a body is moved out of it a little; where it cannot be moved by itself, as something holds a
 /// corner of it or the body is what must give way, it leaves by its velocity.
-void ContactResponse::alter(Touch& touch, Points& y) const {
+void ContactResponse::alter(Touch& touch, Points& y) {
     const Contact& c = touch.contact;
     const bool isHeldThere = isHeld(c);
     if (isBacked(c) || (isHeldThere && !c.isVertex())) {
@@ -544,13 +603,16 @@ void ContactResponse::alter(Touch& touch, Points& y) const {
         return;
     }
     if (isHeldThere) return;
-    const double by = shareTakenBack(c) * std::min(-c.gap, m_edge[c.shell]);
+    const double share = shareTakenBack(c), by = share * std::min(-c.gap, m_edge[c.shell]);
     const double spread = c.weights.squaredNorm();
     for (int a = 0; a < (c.isVertex() ? 1 : 3); ++a) {
         auto column = y.col(globalVertex(c, a));
         const double missing =
             by * c.weights[a] / spread - column.dot(c.normal);  // contacts that share a vertex share y
-        if (missing > 0.0) column += missing * c.normal;
+        if (!(missing > 0.0)) continue;
+        column += missing * c.normal;
+        if (isTakenOut(c.body))
+            m_workOut += weightOf(m_input.shells[c.shell]->masses()[c.vertices[a]]) * missing / share;
     }
     touch.allowedGap = std::min(0.0, c.gap + by);
 }

@@ -39,7 +39,9 @@ class ContactResponse {
         bool isAnyFactored;                    ///< some shell: completely
         bool givesWay;                         ///< false: pushOut would strain some shell
         bool mayBeShorter;                     ///< the step, if fast contacts do not settle soon
+        bool isInVain;                         ///< more rounds have settled nothing lately
         double partOfStep;                     ///< that is being solved, of one that is solved in parts
+        double pushShare;                      ///< of what usually is taken back of a depth at once
         bool onlyStops;  ///< solved velocities need only keep shells from going deeper than they are
     };
     /// Contacts at the start of the step, and the position alteration y of vertices that stand inside a body.
@@ -79,6 +81,10 @@ class ContactResponse {
     /// What finish remembers then is not of this body.
     void forget(int body) { m_forgotten.insert(body); }
     double slop() const { return m_vertexSlop; }
+    /// Whether shells begin the step deep in bodies that stay where they are, among walls, and what it would take to
+    /// lift their vertices there by their depths: what they may gain by being taken out [J].
+    bool isAnyTakenOut() const;
+    double workOut() const { return m_workOut; }
     bool hasFastBody() const { return m_anyFast; }
     /// How deep the step really ends, < 0: the last round may have looked at nothing but what pulls [m].
     double gapAtEnd(const IslandVelocities& solved, const Points& y);
@@ -166,6 +172,7 @@ class ContactResponse {
 
     static constexpr int kFrictionRounds = 4;   ///< then the lagged friction of the last round stands
     static constexpr double kAlteration = 0.2;  ///< share of a penetration that a step takes back
+    static constexpr double kLeastFree = 0.25;  ///< see freeWeights(): what is mostly held is not pushed
     static constexpr double kNearEdge = 0.1;    ///< weight of a triangle's corner below which its contact is an edge's
     static constexpr int kMostChanges = 10;     ///< a contact that flips more often than this stays as it is
 
@@ -193,6 +200,7 @@ class ContactResponse {
     bool closePassed(const Contact& contact, int round);
     double findReach();
     void findAtStart(double reach);
+    void findGapsAtStart();
     void findRoomBesideFaces();
     void findComing();
     void dropTied();
@@ -202,6 +210,9 @@ class ContactResponse {
     bool hasSurfaces() const;
     bool isSurface(const Contact& contact) const;
     bool isLed(int body) const;
+    bool isTakenOut(int body) const;
+    void findSlack();
+    double slackAt(const Contact& contact) const;
     bool leavesSlowly(const Contact& contact) const;
     double shareTakenBack(const Contact& contact) const;
     double speedOutOf(double depth, const Contact& contact) const;
@@ -211,7 +222,7 @@ class ContactResponse {
     void addAtStart(const Contact& contact, Points& y);
     bool isRather(const Touch& touch, const Touch& other, const Memory* memory) const;
     void keepEarliest();
-    void alter(Touch& touch, Points& y) const;
+    void alter(Touch& touch, Points& y);
     void holdVertices();
     bool joinFilter(int touch);
     void jam(Touch& touch, const Touch& other) const;
@@ -245,6 +256,8 @@ class ContactResponse {
     void updateCreeping(Touch& touch) const;
     bool creeps(const Touch& touch) const { return isQuick() && touch.slip.known && touch.slide.norm() <= m_creep; }
     double slowest() const { return 1e-3 * m_input.h * std::max(m_input.gravity.norm(), 1e-3); }
+    /// Where there is no gravity, of one that would take shells out of bodies in a while [N].
+    double weightOf(double mass) const { return mass * std::max(m_input.gravity.norm(), 1.0); }
     bool hasFreeBodies() const;
     bool isAmongWalls() const;
     bool areBorneByOthers() const;
@@ -293,6 +306,9 @@ class ContactResponse {
     std::vector<char> m_stiff;         ///< per shell: has pins and is stiff as a whole, beside free bodies
     bool m_onlyStops = false;          ///< see Numbering
     double m_partOfStep = 1.0;         ///< see Numbering
+    std::vector<double> m_slack;       ///< of vertices: see findSlack; none: nothing is taken out of bodies
+    double m_pushShare = 1.0;          ///< see Numbering
+    double m_workOut = 0.0;            ///< see workOut [J]
     std::vector<Contact> m_found;
     std::pmr::map<int, double> m_room{&m_pool};            ///< of vertices: see findRoomBesideFaces [m]
     std::pmr::set<std::pair<int, int>> m_backed{&m_pool};  ///< (vertex, free body): see findBacked
