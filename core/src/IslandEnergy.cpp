@@ -55,7 +55,7 @@ double IslandSolver::Impl::elasticEnergyGain(const IslandInput& input, std::size
     return sums[1] + sums[0] - elasticAtStart[k];
 }
 
-/// What a step of backward Euler minimises: 1/2 |v - v_0|^2_M + W(x + y + h v) - h f_ext . v   [J]
+/// What a step of backward Euler minimises: 1/2 |v - v_0|^2_M + W(x + y + h v) - h f_ext . v, and what air adds   [J]
 double IslandSolver::Impl::incrementalPotential(const IslandInput& input, const Points& velocities) const {
     double sum = 0.0;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
@@ -67,6 +67,7 @@ double IslandSolver::Impl::incrementalPotential(const IslandInput& input, const 
             sum += shell.masses()[i] * (0.5 * since.col(i).squaredNorm() - stepOf[k] * input.gravity.dot(part.col(i))) -
                    stepOf[k] * shell.forces().col(i).dot(part.col(i));
         sum += elasticEnergyAfter(input, k, velocities);
+        sum += ShellAssembly::potentialOfAir(shell, stepOf[k], input.wind, part);
     }
     return sum;
 }
@@ -78,10 +79,9 @@ double IslandSolver::Impl::energyOfMotion(const IslandInput& input, std::size_t 
            0.5 * shell.masses().sum() * (stepOf[k] * input.gravity).squaredNorm();
 }
 
-/// What shells and bodies gain in the solved step besides what gravity, forces and moved supports do, over the energy
-/// that they start with, or that gravity gives what starts from rest.
+/// What shells and bodies gain in the solved step besides what gravity, forces, air and moved supports do, over the
+/// energy that they start with, or that gravity and air give what starts from rest.
 double IslandSolver::Impl::energyGain(const IslandInput& input) const {
-    if (input.wind) return 0.0;  // what wind and pressure give is not known
     const double out = partOfStep * response.workOut();
     double atStart = 0.0, gain = -out, pushed = -out, mass = 0.0;
     for (std::size_t k = 0; k < input.shells.size(); ++k) {
@@ -89,7 +89,10 @@ double IslandSolver::Impl::energyGain(const IslandInput& input) const {
         const int n = shell.vertexCount();
         const auto part = v.middleCols(offsets[k], n);
         const auto before = from().middleCols(offsets[k], n);
-        if (shell.pressure() != 0.0) return 0.0;
+        const double ofAir = ShellAssembly::workOfAir(shell, stepOf[k], input.wind, before, part);
+        gain -= ofAir;
+        pushed -= ofAir;
+        atStart += std::max(ofAir, 0.0);
         for (int i = 0; i < n; ++i) {
             const Vec3 mean = 0.5 * (part.col(i) + before.col(i));
             const double kinetic = 0.5 * shell.masses()[i] * before.col(i).squaredNorm();

@@ -63,7 +63,8 @@ void IslandSolver::Impl::solveStep(const IslandInput& input, StepReport& report)
     }
     const double mostGain = response.hasFastBody() && bodiesLead(input) ? kMostGainOfFast : kMostEnergyGain;
     if (!unfiltered().allFinite()) return;
-    if (isAmongWalls(input) && energyGain(input) > partOfStep * kEnergyGainAlone) {
+    const double mostAlone = input.bodies.empty() ? kMostEnergyGain : kEnergyGainAlone;
+    if (dynamicBodies.empty() && energyGain(input) > partOfStep * mostAlone) {
         isTooLong = mayBeInParts();
         if (isTooLong || (!patience.isOut() && descend(input, report))) return;
     }
@@ -80,9 +81,10 @@ bool IslandSolver::Impl::mayBeInParts() const {
     return mayBeShorter && response.hasContacts() && !response.isAnyBouncy();
 }
 
-/// Where Newton's method does not settle among walls, nor in the shortest parts of a step: once more from standing
-/// still, which no contact forbids that only stops, and always downhill. So it gains no energy, wherever it ends. False
-/// if it did not come to that.
+/// Where Newton's method does not settle, nor in the shortest parts of a step among walls: once more from standing
+/// still, which no contact forbids that only stops, and always downhill. So it gains no energy, wherever it ends; and
+/// what is stiff, flat and in a gale moves on, which no share of the solved motion would let it. False if it did not
+/// come to that.
 bool IslandSolver::Impl::descend(const IslandInput& input, StepReport& report) {
     constexpr int kMostSteps = 20, kMostHalvings = 20;
     constexpr double kSettled = 1e-3;  // of what the first step brings

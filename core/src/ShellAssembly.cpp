@@ -28,6 +28,23 @@ std::vector<char> rigidTriangles(const HalfEdgeMesh& mesh, const std::vector<cha
     return rigid;
 }
 
+Vec3 sumOver(const std::array<int, 3>& corners, const Eigen::Ref<const Points>& v) {
+    return v.col(corners[0]) + v.col(corners[1]) + v.col(corners[2]);
+}
+
+/// Calls use(corners, what pressure and wind do to each of them) for every triangle, as the start of a step has it.
+void forAir(const Shell& shell, const Wind* wind, const auto& use) {
+    if (!wind && shell.pressure() == 0.0) return;
+    for (int t = 0; t < shell.mesh().triangleCount(); ++t) {
+        const auto corners = cornersOf(shell, t);
+        const Stencil<3> x = gather(shell.positions(), corners);
+        WindOnTriangle air{Vec3::Zero(), Mat3::Zero()};
+        if (wind) air = windOnTriangle(*wind, x, gather(shell.velocities(), corners));
+        air.force += shell.pressure() / 6.0 * (x.col(1) - x.col(0)).cross(x.col(2) - x.col(0));
+        use(corners, air);
+    }
+}
+
 }  // namespace
 
 ShellAssembly::ShellAssembly(const Shell& shell, const ShellDesign& design)
@@ -129,6 +146,27 @@ void ShellAssembly::addLoads(const Shell& shell, const Vec3& gravity, double loa
         const Vec3 areaNormal = 0.5 * (x.col(1) - x.col(0)).cross(x.col(2) - x.col(0));
         for (const int i : corners) m_system.addForce(i, load * shell.pressure() / 3.0 * areaNormal);
     }
+}
+
+double ShellAssembly::workOfAir(const Shell& shell, double h, const Wind* wind, const Eigen::Ref<const Points>& before,
+                                const Eigen::Ref<const Points>& v) {
+    double work = 0.0;
+    forAir(shell, wind, [&](const std::array<int, 3>& corners, const WindOnTriangle& air) {
+        const Vec3 change = sumOver(corners, v) - sumOver(corners, shell.velocities());
+        const Vec3 mean = 0.5 * (sumOver(corners, before) + sumOver(corners, v));
+        work += h * mean.dot(air.force - air.drag * change);
+    });
+    return work;
+}
+
+double ShellAssembly::potentialOfAir(const Shell& shell, double h, const Wind* wind,
+                                     const Eigen::Ref<const Points>& v) {
+    double sum = 0.0;
+    forAir(shell, wind, [&](const std::array<int, 3>& corners, const WindOnTriangle& air) {
+        const Vec3 change = sumOver(corners, v) - sumOver(corners, shell.velocities());
+        sum += h * change.dot(0.5 * air.drag * change - air.force);
+    });
+    return sum;
 }
 
 void ShellAssembly::addWind(const Shell& shell, const Wind& wind) {

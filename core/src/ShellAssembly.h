@@ -27,6 +27,11 @@ class ShellAssembly {
     const StepSystem& assemble(const Shell& shell, double h, const Vec3& gravity, const Wind* wind,
                                const Eigen::Ref<const Points>& start, const Eigen::Ref<const Points>& y,
                                const Eigen::Ref<const Points>* ahead = nullptr, WorkerTeam* team = nullptr);
+    /// What pressure and wind do in a step as assemble has them, from velocities `before` to `v` [J].
+    static double workOfAir(const Shell& shell, double h, const Wind* wind, const Eigen::Ref<const Points>& before,
+                            const Eigen::Ref<const Points>& v);
+    /// Of which their impulse in such a step is minus the gradient by `v` [J].
+    static double potentialOfAir(const Shell& shell, double h, const Wind* wind, const Eigen::Ref<const Points>& v);
     /// K and the unbalanced force in `rhs`, at the shell's positions, under `load` times gravity, forces and pressure.
     const StepSystem& assembleStatic(const Shell& shell, const Vec3& gravity, double load, HessianKind kind);
     const Energy& membrane() const { return *m_energies[0]; }

@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "ShellAssembly.h"
 #include "energy/WindDrag.h"
 #include "jacket/Island.h"
 #include "solver/CoupledSystem.h"
@@ -380,6 +381,40 @@ TEST(PressureTest, InflatesAlongTheNormals) {
     for (int i = 0; i < shell.vertexCount(); ++i)
         EXPECT_GT(shell.positions().col(i).dot(Vec3(out(0, i), 0, out(2, i))),
                   out.col(i).dot(Vec3(out(0, i), 0, out(2, i))));
+}
+
+/// From rest all of it becomes kinetic energy, where a sheet is moved as a whole.
+TEST(AirTest, WorkIsWhatASheetGains) {
+    const Wind wind{.velocity = Vec3(3, 4, 0), .tangentialDrag = 0.3};
+    for (const double pressure : {0.0, 7.0}) {
+        Shell shell(square(4), softSheet()), moved(square(4), softSheet(), withTolerance(1e-13));
+        for (Shell* one : {&shell, &moved}) one->setPressure(pressure);
+        const Points before = shell.velocities();
+        moved.step(kStep, kNoGravity, &wind);
+        const double work = ShellAssembly::workOfAir(shell, kStep, &wind, before, moved.velocities());
+        EXPECT_GT(work, 0.0);
+        EXPECT_NEAR(work, moved.kineticEnergy(moved.velocities()), 1e-9 * work) << pressure;
+    }
+}
+
+/// What is minimised, and what judges a step's energy, are of the same forces.
+TEST(AirTest, WorkIsOfThePotentialsGradient) {
+    const Wind wind{.velocity = Vec3(2, -1, 3), .tangentialDrag = 0.2};
+    Shell shell(makeHemisphere(0.3, 6), softSheet());
+    shell.setPressure(7.0);
+    std::mt19937 random(9);
+    const auto randomPoints = [&](double size) {
+        Points points(3, shell.vertexCount());
+        for (Eigen::Index i = 0; i < points.cols(); ++i) points.col(i) = test::randomVector(random, size);
+        return points;
+    };
+    shell.setVelocities(randomPoints(2.0));
+    const Points v = randomPoints(2.0), d = randomPoints(1.0);
+    const auto potential = [&](double along) {
+        return ShellAssembly::potentialOfAir(shell, kStep, &wind, v + along * d);
+    };
+    const double impulse = ShellAssembly::workOfAir(shell, kStep, &wind, 2.0 * d - v, v);  // times their mean, d
+    EXPECT_NEAR(-(potential(1e-3) - potential(-1e-3)) / 2e-3, impulse, 1e-8 * std::abs(impulse));
 }
 
 // ---- One mode of oscillation

@@ -180,6 +180,27 @@ TEST(Contact, ASheetBetweenBodiesThatOverlapIsLeftWhereItIs) {
     EXPECT_TRUE(sheet.isAsleep());
 }
 
+/// Its upper part in a slab. What air gives in a step is known, so that what is more is not taken for it.
+TEST(Contact, NeitherWindNorPressureThrowsASheetThatBeginsDeepInABox) {
+    for (const ShellMaterial& material : {materials::cotton(), materials::steel(5e-4)})
+        for (const bool isWindy : {true, false}) {
+            Scene scene;
+            auto& slab = scene.addBox(btVector3(1, btScalar(0.1), 1), 0.0, btVector3(0, btScalar(1.5), 0));
+            TriangleMesh mesh = squareSheet(0.6, 14);
+            for (Eigen::Index i = 0; i < mesh.positions.cols(); ++i)
+                mesh.positions.col(i) = Vec3(mesh.positions(0, i), 1.2 + mesh.positions(2, i), 0.0);
+            auto& sheet = scene.shells->add(mesh, material, {.friction = 0.5});
+            if (isWindy)
+                scene.shells->setWind({.velocity = Vec3(1, 0, 3)});
+            else
+                sheet.shell().setPressure(1.0);
+            const SheetCourse course(scene, sheet, 60, kStep);
+            EXPECT_LT(course.fastest, 15.0) << material.young << isWindy;  // falling and blown along: up to 10
+            EXPECT_LT(course.solves, 400) << material.young << isWindy;
+            EXPECT_LT(penetration(sheet, slab), 1e-4) << material.young << isWindy;
+        }
+}
+
 /// Bodies smaller than a triangle, or with corners that are, on a sheet of coarse cells.
 class SmallBody : public ::testing::TestWithParam<std::tuple<const char*, double>> {};
 
