@@ -180,6 +180,17 @@ TEST(Contact, ASheetBetweenBodiesThatOverlapIsLeftWhereItIs) {
     EXPECT_TRUE(sheet.isAsleep());
 }
 
+/// Nearest to the way up here and to the way down there: what has been strained by as much as it may be is pushed no
+/// more.
+TEST(Contact, ASheetThroughTheMiddleOfABallIsNotThrown) {
+    Scene scene;
+    scene.addSphere(0.25, 0.0, btVector3(btScalar(-0.02), 0, btScalar(0.05)));
+    auto& sheet = scene.shells->add(squareSheet(1, 12), materials::paper(), {.friction = 0.5});
+    for (int i = 0; i < sheet.vertexCount(); ++i)
+        if (sheet.shell().positions()(0, i) < -0.499) sheet.pin(i);
+    EXPECT_LT(SheetCourse(scene, sheet, 30, kStep).fastest, 5.0);
+}
+
 /// Its upper part in a slab. What air gives in a step is known, so that what is more is not taken for it.
 TEST(Contact, NeitherWindNorPressureThrowsASheetThatBeginsDeepInABox) {
     for (const ShellMaterial& material : {materials::cotton(), materials::steel(5e-4)})

@@ -603,7 +603,7 @@ void ContactResponse::alter(Touch& touch, Points& y) {
         return;
     }
     if (isHeldThere) return;
-    const double share = shareTakenBack(c), by = share * std::min(-c.gap, m_edge[c.shell]);
+    const double depth = std::min(-c.gap, m_edge[c.shell]), by = shareTakenBack(c) * depth;
     const double spread = c.weights.squaredNorm();
     for (int a = 0; a < (c.isVertex() ? 1 : 3); ++a) {
         auto column = y.col(globalVertex(c, a));
@@ -611,8 +611,9 @@ void ContactResponse::alter(Touch& touch, Points& y) {
             by * c.weights[a] / spread - column.dot(c.normal);  // contacts that share a vertex share y
         if (!(missing > 0.0)) continue;
         column += missing * c.normal;
-        if (isTakenOut(c.body))
-            m_workOut += weightOf(m_input.shells[c.shell]->masses()[c.vertices[a]]) * missing / share;
+        if (!isTakenOut(c.body) || by == 0.0) continue;
+        const double lifted = std::min(c.weights[a] / spread, missing / by) * depth;  // in the end
+        m_workOut += weightOf(m_input.shells[c.shell]->masses()[c.vertices[a]]) * lifted;
     }
     touch.allowedGap = std::min(0.0, c.gap + by);
 }
