@@ -4,6 +4,7 @@
 
 #include "support/AllocationCount.h"
 #include "support/BulletScene.h"
+#include "support/EmbeddedScenes.h"
 
 namespace jacket::bullet::testing {
 namespace {
@@ -48,6 +49,10 @@ void sheetOnBoxOnFloor(BulletScene& scene, const ShellMaterial& material) {
     addAwakeBody(scene, box(0.1), 1, btVector3(0, btScalar(-0.12), 0));
 }
 
+void curtainInACeiling(BulletScene& scene) {
+    embedded_scenes::curtain("").make(scene, materials::cotton(), 14);
+}
+
 struct Case {
     const char* name;
     std::function<void(BulletScene&)> build;
@@ -58,7 +63,7 @@ class Step : public ::testing::TestWithParam<Case> {};
 INSTANTIATE_TEST_SUITE_P(
     Of, Step,
     ::testing::Values(Case{"ClothOverABall", drape}, Case{"ABallOnATrampoline", ballOnTrampoline},
-                      Case{"AStackOnATrampoline", stackOnTrampoline, 30},
+                      Case{"AStackOnATrampoline", stackOnTrampoline, 30}, Case{"ACurtainInACeiling", curtainInACeiling},
                       Case{"ClothOnABoxOnTheFloor", [](auto& s) { sheetOnBoxOnFloor(s, trampolineCloth()); }},
                       Case{"APlateOnABoxOnTheFloor", [](auto& s) { sheetOnBoxOnFloor(s, materials::steel(2e-3)); }}),
     [](const auto& parameter) { return std::string(parameter.param.name); });

@@ -38,7 +38,7 @@ void ContactResponse::findAtEnd(const IslandVelocities& solved, const Points& y)
     m_found.clear();
     const double faceSlop = hasSurfaces() ? std::min(m_vertexSlop, m_faceSlop) : m_faceSlop;
     m_input.contacts->find({m_endPoses, m_endTwists, m_input.h}, -m_vertexSlop, -faceSlop, m_found);
-    dropTied();
+    dropHeldInside();
     std::sort(m_found.begin(), m_found.end(), [](const Contact& a, const Contact& b) { return a.gap < b.gap; });
     dropPassed();
 }
@@ -67,11 +67,12 @@ ContactSweep ContactResponse::wayToEnd(std::span<const char> bodies) {
 void ContactResponse::sweepToEnd() {
     m_found.clear();
     m_input.contacts->sweep(wayToEnd(m_fast), m_found);
-    dropTied();
+    dropHeldInside();
 }
 
 /// Not only of fast bodies: between the corners of a triangle larger than they are others go through it little by
-/// little, and where contacts have not settled anything may. (What is anchored in its middle has a triangle there.)
+/// little, and where contacts have not settled anything may. (What is anchored in its middle has a triangle there, as
+/// what is embedded in one that stays may have.)
 bool ContactResponse::passes(const IslandVelocities& solved, const Points& y, bool isUnsure) {
     if (!m_input.contacts) return false;
     const double longest = *std::max_element(m_edge.begin(), m_edge.end());
@@ -79,6 +80,7 @@ bool ContactResponse::passes(const IslandVelocities& solved, const Points& y, bo
     for (std::size_t b = 0; b < m_input.bodies.size(); ++b)
         m_mayCross.push_back(isUnsure || m_fast[b] || m_input.bodies[b].inner < longest);
     for (const Anchor& anchor : m_input.anchors) m_mayCross[anchor.body] = 0;
+    for (const auto& [vertex, body] : m_embedded) m_mayCross[body] &= isLed(body);
     const bool mayAnyCross = std::find(m_mayCross.begin(), m_mayCross.end(), 1) != m_mayCross.end();
     if (!m_anyFast && !mayAnyCross) return false;
     if (!isQuick()) moveToEnd(solved, y);  // else pushOut is to know where what it pushes was found
@@ -263,8 +265,10 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
 /// Whether what stood inside the body at the start is taken out of it by and by. In the short time that is a part of a
 /// step a face that leaves at once would throw the shell, or the body.
 bool ContactResponse::leavesSlowly(const Contact& contact) const {
+    if (isBacked(contact)) return true;
+    if (contact.isVertex()) return false;
     const bool isInPart = m_partOfStep < 1.0 && !isLed(contact.body);
-    return isBacked(contact) || (!contact.isVertex() && (isInPart || isTakenOut(contact.body)));
+    return isInPart || isTakenOut(contact.body) || m_leaving.count(faceOf(contact)) > 0;
 }
 
 /// Sets what a contact where the end found it is to reach. `lacks`: see missing.

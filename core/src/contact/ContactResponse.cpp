@@ -55,7 +55,7 @@ ContactResponse::Key ContactResponse::keyOf(const Contact& c) const {
     const int firstTriangle = Feature::triangle(0, mesh.vertexCount(), static_cast<int>(mesh.edges().size()));
     if (!c.isVertex() && feature >= firstTriangle && c.weights.minCoeff(&corner) < kNearEdge)
         feature = Feature::edge(mesh.edgeOf(3 * (feature - firstTriangle) + (corner + 1) % 3), mesh.vertexCount());
-    return {&shell, m_input.bodies[c.body].key, feature};
+    return keyOf(c.shell, c.body, feature);
 }
 
 /// What the last step knew of a contact. A point of a face may have moved to a neighbouring one since.
@@ -223,7 +223,8 @@ void ContactResponse::findAtStart(double reach) {
     const auto find = [&](double faceReach) {
         m_found.clear();
         m_input.contacts->find({m_startPoses, m_still, 0.0, m_reachOf}, reach, faceReach, m_found);
-        dropTied();
+        findEmbedded();
+        dropHeldInside();
     };
     m_found.clear();
     m_backed.clear();
@@ -240,11 +241,13 @@ void ContactResponse::findAtStart(double reach) {
     if (areSurfaces || isBesidePin) findBacked();
     findGapsAtStart();
     m_slack.clear();
-    if (!isAnyTakenOut()) return;
-    findSlack();
-    if (wantsFaces) return;
-    find(10.0 * m_vertexSlop);
-    findGapsAtStart();
+    if (isAnyTakenOut()) findSlack();
+    const bool areKnown = areSurfaces || wantsFaces || isBesidePin || isAnyComing;
+    if (!areKnown && (isAnyTakenOut() || wasAnyEmbedded())) {
+        find(10.0 * m_vertexSlop);
+        findGapsAtStart();
+    }
+    findLeaving();
 }
 
 /// Of each vertex how far its edges are from being strained by as much as taking shells out of bodies may bring about:
@@ -280,18 +283,6 @@ void ContactResponse::findGapsAtStart() {
     for (const Contact& contact : m_found)
         if (freeWeights(contact) > kLeastFree)
             m_gapAtStart[contact.body] = std::min(m_gapAtStart[contact.body], contact.gap);
-}
-
-/// Takes out of what was found the vertices that are anchored to the body that they touch, and what is nearly at one:
-/// they move as the body does, and no contact can lead them out of it.
-void ContactResponse::dropTied() {
-    if (m_tied.empty()) return;
-    std::erase_if(m_found, [&](const Contact& contact) {
-        double tied = 0.0;
-        for (int a = 0; a < 3; ++a)
-            if (m_tied.count({globalVertex(contact, a), contact.body}) > 0) tied += contact.weights[a];
-        return tied > 1.0 - kNearEdge;
-    });
 }
 
 bool ContactResponse::hasFreeBodies() const {
@@ -466,8 +457,7 @@ bool ContactResponse::isLed(int body) const {
 /// Whether the shells begin the step deep in a body that stays where it is, among walls: they are taken out of it
 /// little by little, and their faces are not to leave it at once.
 bool ContactResponse::isTakenOut(int body) const {
-    constexpr double kDeep = 20.0;  // times the contacts' slop
-    return m_gapAtStart[body] < -kDeep * m_vertexSlop && !hasFreeBodies() && !isLed(body);
+    return m_gapAtStart[body] < -kDeepAtStart * m_vertexSlop && !hasFreeBodies() && !isLed(body);
 }
 
 bool ContactResponse::isAnyTakenOut() const {
@@ -976,6 +966,7 @@ const std::vector<double>& ContactResponse::speedsBeside(const Points& a, const 
 void ContactResponse::finish(std::vector<ContactImpulse>& impulses) {
     m_memory.clear();
     m_memoryStep = m_input.h;
+    rememberEmbedded();
     for (const Touch& touch : m_touches) {
         const bool pushes = touch.active && (touch.pressing > 0.0 || touch.isVain) && !touch.bounces;
         if (!touch.impulse.isZero(0.0))  // took part in the last solve

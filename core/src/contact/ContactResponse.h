@@ -150,7 +150,8 @@ class ContactResponse {
         double left = 0.0;     ///< gap that remains then [m]
         double impulse = 0.0;  ///< that it took [N s]
     };
-    using Key = std::tuple<const void*, const void*, int>;  ///< shell, body, feature
+    using Key = std::tuple<const void*, const void*, int>;                  ///< shell, body, feature
+    using Face = std::tuple<const void*, const void*, std::array<int, 3>>;  ///< shell, body, vertices
     struct Memory {
         double impulse, offset;
         bool sticks;
@@ -170,16 +171,21 @@ class ContactResponse {
         int opposite = -1;  ///< a touch from the other side, by a body of prescribed motion too
     };
 
-    static constexpr int kFrictionRounds = 4;   ///< then the lagged friction of the last round stands
-    static constexpr double kAlteration = 0.2;  ///< share of a penetration that a step takes back
-    static constexpr double kLeastFree = 0.25;  ///< see freeWeights(): what is mostly held is not pushed
-    static constexpr double kNearEdge = 0.1;    ///< weight of a triangle's corner below which its contact is an edge's
-    static constexpr int kMostChanges = 10;     ///< a contact that flips more often than this stays as it is
+    static constexpr int kFrictionRounds = 4;     ///< then the lagged friction of the last round stands
+    static constexpr double kAlteration = 0.2;    ///< share of a penetration that a step takes back
+    static constexpr double kLeastFree = 0.25;    ///< see freeWeights(): what is mostly held is not pushed
+    static constexpr double kDeepAtStart = 20.0;  ///< times the slop: what begins deeper in a body leaves it slowly
+    static constexpr double kNearEdge = 0.1;  ///< weight of a triangle's corner below which its contact is an edge's
+    static constexpr int kMostChanges = 10;   ///< a contact that flips more often than this stays as it is
 
     static bool isFacing(const Contact& a, const Contact& b) { return a.normal.dot(b.normal) < -0.7; }
     /// Projector on the directions across a normal.
     static Mat3 tangential(const Vec3& n) { return Mat3::Identity() - n * n.transpose(); }
     Key keyOf(const Contact& c) const;
+    Key keyOf(int shell, int body, int feature) const {
+        return {m_input.shells[shell], m_input.bodies[body].key, feature};
+    }
+    Face faceOf(const Contact& c) const { return {m_input.shells[c.shell], m_input.bodies[c.body].key, c.vertices}; }
     Memory* remembered(const Contact& c);
     void findHeirs();
     bool inherits(const Contact& c, Memory& memory) const;
@@ -203,7 +209,15 @@ class ContactResponse {
     void findGapsAtStart();
     void findRoomBesideFaces();
     void findComing();
-    void dropTied();
+    void findEmbedded();
+    bool isHeldDeep(const Contact& contact) const;
+    bool mayHangInside(const Contact& contact) const;
+    bool wasAnyEmbedded() const;
+    bool wasEmbedded(const Contact& contact, int vertex) const;
+    void findLeaving();
+    void rememberEmbedded();
+    bool isHeldInside(const Contact& contact) const;
+    void dropHeldInside();
     bool mayBeBacked() const;
     void findBacked();
     bool isBacked(const Contact& contact) const;
@@ -310,9 +324,13 @@ class ContactResponse {
     double m_pushShare = 1.0;          ///< see Numbering
     double m_workOut = 0.0;            ///< see workOut [J]
     std::vector<Contact> m_found;
-    std::pmr::map<int, double> m_room{&m_pool};            ///< of vertices: see findRoomBesideFaces [m]
-    std::pmr::set<std::pair<int, int>> m_backed{&m_pool};  ///< (vertex, free body): see findBacked
-    std::pmr::set<std::pair<int, int>> m_tied{&m_pool};    ///< (vertex, body): anchored to it
+    std::pmr::map<int, double> m_room{&m_pool};              ///< of vertices: see findRoomBesideFaces [m]
+    std::pmr::set<std::pair<int, int>> m_backed{&m_pool};    ///< (vertex, free body): see findBacked
+    std::pmr::set<std::pair<int, int>> m_tied{&m_pool};      ///< (vertex, body): anchored to it
+    std::pmr::set<std::pair<int, int>> m_embedded{&m_pool};  ///< (vertex, body): see findEmbedded
+    std::pmr::set<Face> m_leaving{&m_pool};                  ///< see findLeaving
+    std::pmr::set<Face> m_leavingBefore{&m_pool};            ///< the same of the last step
+    std::pmr::set<Key> m_embeddedBefore{&m_pool};            ///< with features of vertices
     std::pmr::map<int, Vec3> m_raised{
         &m_pool};  ///< by what their own contacts take vertices out of bodies in this round [m]
     std::pmr::set<int> m_claimed{&m_pool};    ///< vertices of the soft rows that this round has added

@@ -76,7 +76,8 @@ class ShellBody {
     const Indices<3>& triangles() const { return m_shell.mesh().triangles(); }
     int vertexCount() const { return m_shell.vertexCount(); }
 
-    /// Holds a vertex in space; throws std::out_of_range.
+    /// Holds a vertex in space; throws std::out_of_range. One deeper than a millimetre (a fiftieth of an edge, if that
+    /// is less) in a static, kinematic or sleeping body does not collide with it, nor does what hangs on it in there.
     void pin(int vertex);
     void movePin(int vertex, const btVector3& target);
     void unpin(int vertex);
@@ -87,12 +88,11 @@ class ShellBody {
     StaticReport settle(const btVector3& gravity, const StaticSettings& settings = {});
     /// Ties a vertex to a body at their present distance. One thing at a time holds a vertex, the one that was asked
     /// for last: an anchor ends the vertex's pin, guide or earlier anchor (also to the same body), and what pins,
-    /// clamps or guides the vertex ends its anchor. The vertex does not collide with its body; others do, also where
-    /// they begin inside it (see btCollisionObject::setIgnoreCollisionCheck). The body may be removed at any time,
-    /// which frees the vertex (also if the body is added again: a new entry of the broadphase is a new body). A body
-    /// that is teleported (see isTeleport) takes the shell along as it is, turned with the body, if no pins, guides or
-    /// other bodies hold it that stay; else it lets go, of which ShellWorld::takeWarnings() tells. Throws
-    /// std::out_of_range.
+    /// clamps or guides the vertex ends its anchor. The vertex does not collide with its body; others do, unless they
+    /// hang on it inside the body, as with pin. The body may be removed at any time, which frees the vertex (also if
+    /// the body is added again: a new entry of the broadphase is a new body). A body that is teleported (see
+    /// isTeleport) takes the shell along as it is, turned with the body, if no pins, guides or other bodies hold it
+    /// that stay; else it lets go, of which ShellWorld::takeWarnings() tells. Throws std::out_of_range.
     void anchor(int vertex, btRigidBody& body);
     void anchor(int vertex, btMultiBodyLinkCollider& link);
     /// Ends a vertex's anchor, if it has one; throws std::out_of_range.
