@@ -28,6 +28,12 @@ std::vector<char> rigidTriangles(const HalfEdgeMesh& mesh, const std::vector<cha
     return rigid;
 }
 
+/// On each corner of a triangle [N].
+Vec3 forceOfPressure(const Stencil<3>& x, double pressure) {
+    const Vec3 areaNormal = 0.5 * (x.col(1) - x.col(0)).cross(x.col(2) - x.col(0));
+    return pressure / 3.0 * areaNormal;
+}
+
 Vec3 sumOver(const std::array<int, 3>& corners, const Eigen::Ref<const Points>& v) {
     return v.col(corners[0]) + v.col(corners[1]) + v.col(corners[2]);
 }
@@ -40,7 +46,7 @@ void forAir(const Shell& shell, const Wind* wind, const auto& use) {
         const Stencil<3> x = gather(shell.positions(), corners);
         WindOnTriangle air{Vec3::Zero(), Mat3::Zero()};
         if (wind) air = windOnTriangle(*wind, x, gather(shell.velocities(), corners));
-        air.force += shell.pressure() / 6.0 * (x.col(1) - x.col(0)).cross(x.col(2) - x.col(0));
+        air.force += forceOfPressure(x, shell.pressure());
         use(corners, air);
     }
 }
@@ -142,9 +148,8 @@ void ShellAssembly::addLoads(const Shell& shell, const Vec3& gravity, double loa
     if (shell.pressure() == 0.0) return;
     for (int t = 0; t < shell.mesh().triangleCount(); ++t) {
         const auto corners = cornersOf(shell, t);
-        const Stencil<3> x = gather(shell.positions(), corners);
-        const Vec3 areaNormal = 0.5 * (x.col(1) - x.col(0)).cross(x.col(2) - x.col(0));
-        for (const int i : corners) m_system.addForce(i, load * shell.pressure() / 3.0 * areaNormal);
+        const Vec3 force = forceOfPressure(gather(shell.positions(), corners), load * shell.pressure());
+        for (const int i : corners) m_system.addForce(i, force);
     }
 }
 
