@@ -216,9 +216,10 @@ double ContactResponse::findReach() {
     return most;
 }
 
-/// What is near at the start of the step, into m_found. Faces are looked for where the last step held any, or a part of
-/// this one may have left any inside, and as far as vertices where free bodies meet surfaces, or come: known by walls,
-/// by pins everywhere and by stiff shells before anything is found, else by the vertices that are.
+/// What is near at the start of the step, into m_found. Faces are looked for where the last step held any, or found any
+/// embedded, or a part of this one may have left any inside, and as far as vertices where free bodies meet surfaces, or
+/// come: known by walls, by pins everywhere and by stiff shells before anything is found, else by the vertices that
+/// are.
 void ContactResponse::findAtStart(double reach) {
     const auto find = [&](double faceReach) {
         m_found.clear();
@@ -232,7 +233,7 @@ void ContactResponse::findAtStart(double reach) {
     for (const Shell* shell : m_input.shells)
         m_stiff.push_back(hasFreeBodies() && shell->pinCount() > 0 && shell->isStiffAsAWhole(m_input.h));
     const bool areSurfaces = mayBeBacked() || hasSurfaces();
-    const bool wantsFaces = !m_memory.empty() || m_partOfStep < 1.0;
+    const bool wantsFaces = !m_memory.empty() || wasAnyEmbedded() || m_partOfStep < 1.0;
     find(areSurfaces ? reach : wantsFaces ? 10.0 * m_vertexSlop : kNone);
     findComing();
     const bool isAnyComing = std::find(m_comes.begin(), m_comes.end(), 1) != m_comes.end();
@@ -241,13 +242,12 @@ void ContactResponse::findAtStart(double reach) {
     if (areSurfaces || isBesidePin) findBacked();
     findGapsAtStart();
     m_slack.clear();
-    if (isAnyTakenOut()) findSlack();
-    const bool areKnown = areSurfaces || wantsFaces || isBesidePin || isAnyComing;
-    if (!areKnown && (isAnyTakenOut() || wasAnyEmbedded())) {
-        find(10.0 * m_vertexSlop);
-        findGapsAtStart();
-    }
     findLeaving();
+    if (!isAnyTakenOut()) return;
+    findSlack();
+    if (wantsFaces) return;
+    find(10.0 * m_vertexSlop);
+    findGapsAtStart();
 }
 
 /// Of each vertex how far its edges are from being strained by as much as taking shells out of bodies may bring about:
