@@ -2,7 +2,6 @@
 // inside. Times are of this machine; compare those of one run.
 #include <algorithm>
 #include <cstdio>
-#include <iterator>
 #include <memory>
 #include <string>
 
@@ -28,28 +27,26 @@ void runHeld(const EmbeddedScene& scene, int cells) {
     for (const Named& of : kMaterials)
         for (const double h : {1.0 / 20, 1.0 / 60, 1.0 / 240}) {
             const EmbeddedScene::Run run = scene.run(of.material, cells, h);
-            const bool isDeep = run.deepest > 5e-4, isThrown = run.fastest > scene.fastest;
-            if (isDeep || isThrown || run.unsettled > 5) {
+            const char* const fault = run.outcome.fault(scene.fastest);
+            if (fault)
                 std::printf("  %-9s %s, 1/%.0f s: at most %.2g m/s, %.2g mm deep, stretched by %.2g, %d unsettled\n",
-                            isThrown ? "thrown" : (isDeep ? "deep" : "unsettled"), of.name, 1.0 / h, run.fastest,
-                            1e3 * run.deepest, run.stretch, run.unsettled);
-                ++faulty;
-            }
+                            fault, of.name, 1.0 / h, run.outcome.fastest, 1e3 * run.outcome.deepest, run.stretch,
+                            run.outcome.unsettled);
+            faulty += fault ? 1 : 0;
             ++all;
             sum.steps += run.steps;
             sum.solves += run.solves;
             sum.seconds += run.seconds;
-            sum.unsettled += run.unsettled;
             sum.most = std::max(sum.most, run.most);
             sum.longest = std::max(sum.longest, run.longest);
-            sum.fastest = std::max(sum.fastest, run.fastest);
+            sum.outcome.fastest = std::max(sum.outcome.fastest, run.outcome.fastest);
             sum.stretch = std::max(sum.stretch, run.stretch);
         }
     std::printf(
         "%-28s %2d cells: %5.1f solves, at most %4d; %6.2f ms, at most %5.0f; at most %5.2f m/s, stretched by %.2g; "
         "%d of %d go wrong\n",
         scene.name, cells, double(sum.solves) / sum.steps, sum.most, 1e3 * sum.seconds / sum.steps, 1e3 * sum.longest,
-        sum.fastest, sum.stretch, faulty, all);
+        sum.outcome.fastest, sum.stretch, faulty, all);
     std::fflush(stdout);
 }
 
@@ -62,16 +59,11 @@ std::unique_ptr<btCollisionShape> makeCrate() {
 std::unique_ptr<btCollisionShape> makeLog() {
     return std::make_unique<btCapsuleShapeX>(btScalar(0.15), btScalar(0.4));
 }
-constexpr double kHalf = 0.499;  // of the sheet's side [m]
-bool isAtBorder(const Vec3& x) {
-    return std::max(std::abs(x.x()), std::abs(x.z())) > kHalf;
+void pinEdge(ShellBody& sheet) {
+    for (const int i : embedded_scenes::verticesWhere(sheet, [](const Vec3& x) { return x.x() < -0.499; }))
+        sheet.pin(i);
 }
-bool isAtEdge(const Vec3& x) {
-    return x.x() < -kHalf;
-}
-bool isNowhere(const Vec3&) {
-    return false;
-}
+void leaveFree(ShellBody&) {}
 
 struct Form {
     const char* name;
@@ -80,29 +72,27 @@ struct Form {
 constexpr Form kForms[] = {{"ball", makeBall}, {"crate", makeCrate}, {"log", makeLog}};
 struct Hold {
     const char* name;
-    bool (*isHeld)(const Vec3&);
+    void (*hold)(ShellBody&);
 };
-constexpr Hold kHolds[] = {{"its border", isAtBorder}, {"one edge", isAtEdge}, {"nothing", isNowhere}};
+constexpr Hold kHolds[] = {{"its border", pinBorder}, {"one edge", pinEdge}, {"nothing", leaveFree}};
 
 /// Sheets of 1 m that begin in a fixed body, in its middle or above.
 void runBegun(const Form& form, const Hold& hold) {
     constexpr int kSteps = 120, kCells = 12;
-    int solves = 0, most = 0, out = 0, all = 0, unsettled = 0;
-    double fastest = 0.0;
+    int solves = 0, most = 0, out = 0, all = 0;
+    SheetOutcome outcome;  // of all
     for (const Named& of : kMaterials)
         for (const double height : {0.0, 0.05, 0.1}) {
             BulletScene scene;
             const auto& body =
                 scene.addBody(form.make(), 0.0, btVector3(btScalar(-0.02), btScalar(-height), btScalar(0.05)));
             auto& sheet = scene.shells->add(squareSheet(1.0, kCells), of.material, {.friction = 0.5});
-            for (const int i : embedded_scenes::verticesWhere(sheet, hold.isHeld)) sheet.pin(i);
+            hold.hold(sheet);
             for (int i = 0; i < kSteps; ++i) {
                 scene.step(kStep);
-                const WorldReport& report = scene.shells->lastStep();
-                solves += report.solves;
-                most = std::max(most, report.solves);
-                unsettled += report.settled ? 0 : 1;
-                fastest = std::max(fastest, sheet.shell().velocities().colwise().norm().maxCoeff());
+                solves += scene.shells->lastStep().solves;
+                most = std::max(most, int(scene.shells->lastStep().solves));
+                outcome.note(scene, sheet, 0.0);
             }
             out += penetration(sheet, body) < 1e-3 ? 1 : 0;
             ++all;
@@ -110,7 +100,7 @@ void runBegun(const Form& form, const Hold& hold) {
     std::printf(
         "begins in a %-5s held by %-10s %6.1f solves, at most %4d; %d steps unsettled; at most %.2g m/s; %d of "
         "%d come out\n",
-        form.name, hold.name, double(solves) / (all * kSteps), most, unsettled, fastest, out, all);
+        form.name, hold.name, double(solves) / (all * kSteps), most, outcome.unsettled, outcome.fastest, out, all);
     std::fflush(stdout);
 }
 

@@ -8,6 +8,7 @@
 #include <tuple>
 #include <vector>
 
+#include "support/EmbeddedScenes.h"
 #include "support/HardScenes.h"
 #include "support/PlateScene.h"
 
@@ -197,10 +198,7 @@ TEST(Contact, NeitherWindNorPressureThrowsASheetThatBeginsDeepInABox) {
         for (const bool isWindy : {true, false}) {
             Scene scene;
             auto& slab = scene.addBox(btVector3(1, btScalar(0.1), 1), 0.0, btVector3(0, btScalar(1.5), 0));
-            TriangleMesh mesh = squareSheet(0.6, 14);
-            for (Eigen::Index i = 0; i < mesh.positions.cols(); ++i)
-                mesh.positions.col(i) = Vec3(mesh.positions(0, i), 1.2 + mesh.positions(2, i), 0.0);
-            auto& sheet = scene.shells->add(mesh, material, {.friction = 0.5});
+            auto& sheet = embedded_scenes::addHanging(scene, material, 14);
             if (isWindy)
                 scene.shells->setWind({.velocity = Vec3(1, 0, 3)});
             else

@@ -23,10 +23,10 @@ TEST_P(Embedded, SheetCostsLittleAndIsNeitherThrownNorTorn) {
             const EmbeddedScene::Run run = scene.run(material, cells, kStep, 1.0);
             EXPECT_LT(run.solves, mostSolves * run.steps) << scene.name << cells;
             EXPECT_LT(run.most, 200) << scene.name << cells;
-            EXPECT_LE(run.unsettled, 1) << scene.name << cells;
-            EXPECT_LT(run.fastest, scene.fastest) << scene.name << cells;
+            EXPECT_LE(run.outcome.unsettled, 1) << scene.name << cells;
+            EXPECT_LT(run.outcome.fastest, scene.fastest) << scene.name << cells;
             EXPECT_LT(run.stretch, 0.1) << scene.name << cells;
-            EXPECT_LT(run.deepest, 5e-4) << scene.name << cells;
+            EXPECT_LT(run.outcome.deepest, 5e-4) << scene.name << cells;
         }
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, Embedded, ::testing::Range<std::size_t>(0, all().size()));

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "support/BulletScene.h"
+#include "support/SheetOutcome.h"
 
 namespace jacket::bullet::testing {
 
@@ -21,11 +21,10 @@ struct EmbeddedScene {
     };
     /// What a run has cost, and been at worst.
     struct Run {
-        int steps = 0, solves = 0, most = 0, unsettled = 0;  ///< most: solves of one step
-        double seconds = 0.0, longest = 0.0;                 ///< of all steps, of one [s]
-        double fastest = 0.0;                                ///< vertex [m/s]
-        double stretch = 0.0;                                ///< of an edge [-]
-        double deepest = 0.0;                                ///< in the body, of a vertex that began outside of it [m]
+        SheetOutcome outcome;                 ///< deepest: of a vertex that began outside of the body
+        int steps = 0, solves = 0, most = 0;  ///< most: solves of one step
+        double seconds = 0.0, longest = 0.0;  ///< of all steps, of one [s]
+        double stretch = 0.0;                 ///< of an edge [-]
     };
 
     const char* name;
@@ -43,15 +42,15 @@ struct EmbeddedScene {
             const auto before = Clock::now();
             scene.step(h);
             const double took = std::chrono::duration<double>(Clock::now() - before).count();
-            const WorldReport& report = scene.shells->lastStep();
+            const int solves = scene.shells->lastStep().solves;
             run.seconds += took;
             run.longest = std::max(run.longest, took);
-            run.solves += report.solves;
-            run.most = std::max(run.most, report.solves);
-            run.unsettled += report.settled ? 0 : 1;
-            run.fastest = std::max(run.fastest, held.sheet.shell().velocities().colwise().norm().maxCoeff());
+            run.solves += solves;
+            run.most = std::max(run.most, solves);
             run.stretch = std::max(run.stretch, held.sheet.shell().maxStretch());
-            for (const int vertex : outside) run.deepest = std::max(run.deepest, -distance(held, vertex));
+            double depth = 0.0;
+            for (const int vertex : outside) depth = std::max(depth, -distance(held, vertex));
+            run.outcome.note(scene, held.sheet, depth);
             ++run.steps;
         }
         return run;
