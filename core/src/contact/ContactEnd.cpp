@@ -444,21 +444,6 @@ Vec3 ContactResponse::sinceFound(const Contact& contact, int corner, const Point
            m_end[contact.shell].col(i);
 }
 
-bool ContactResponse::isHeld(const Contact& contact) const {
-    for (int a = 0; a < 3; ++a)
-        if (contact.weights[a] > 0.0 && m_held[globalVertex(contact, a)]) return true;
-    return false;
-}
-
-/// Squares of the weights of those of a contact's vertices that nothing holds, summed. Each moved by its weight over
-/// this sum, they move the point by 1.
-double ContactResponse::freeWeights(const Contact& contact) const {
-    double sum = 0.0;
-    for (int a = 0; a < 3; ++a)
-        if (!m_held[globalVertex(contact, a)]) sum += contact.weights[a] * contact.weights[a];
-    return sum;
-}
-
 /// Moves a contact's point out along its normal by those of its vertices that nothing holds, besides what its vertices
 /// have been moved by. Whether it had to.
 bool ContactResponse::push(Push& one) {
