@@ -22,11 +22,11 @@ const Named kMaterials[] = {{"cotton", materials::cotton()},
 
 /// One line a scene and mesh, over materials and steps; one besides for each that goes wrong.
 void runHeld(const EmbeddedScene& scene, int cells) {
-    EmbeddedScene::Run sum;
+    SheetRun sum;
     int all = 0, faulty = 0;
     for (const Named& of : kMaterials)
         for (const double h : {1.0 / 20, 1.0 / 60, 1.0 / 240}) {
-            const EmbeddedScene::Run run = scene.run(of.material, cells, h);
+            const SheetRun run = scene.run(of.material, cells, h);
             const char* const fault = run.outcome.fault(scene.fastest);
             if (fault)
                 std::printf("  %-9s %s, 1/%.0f s: at most %.2g m/s, %.2g mm deep, stretched by %.2g, %d unsettled\n",
@@ -34,13 +34,7 @@ void runHeld(const EmbeddedScene& scene, int cells) {
                             run.outcome.unsettled);
             faulty += fault ? 1 : 0;
             ++all;
-            sum.steps += run.steps;
-            sum.solves += run.solves;
-            sum.seconds += run.seconds;
-            sum.most = std::max(sum.most, run.most);
-            sum.longest = std::max(sum.longest, run.longest);
-            sum.outcome.fastest = std::max(sum.outcome.fastest, run.outcome.fastest);
-            sum.stretch = std::max(sum.stretch, run.stretch);
+            sum.add(run);
         }
     std::printf(
         "%-28s %2d cells: %5.1f solves, at most %4d; %6.2f ms, at most %5.0f; at most %5.2f m/s, stretched by %.2g; "

@@ -20,7 +20,7 @@ TEST_P(Embedded, SheetCostsLittleAndIsNeitherThrownNorTorn) {
     const EmbeddedScene scene = all()[GetParam()];
     for (const auto& [material, mostSolves] : {std::pair{materials::cotton(), 12}, {materials::paper(), 36}})
         for (const int cells : {8, 14}) {
-            const EmbeddedScene::Run run = scene.run(material, cells, kStep, 1.0);
+            const SheetRun run = scene.run(material, cells, kStep, 1.0);
             EXPECT_LT(run.solves, mostSolves * run.steps) << scene.name << cells;
             EXPECT_LT(run.most, 200) << scene.name << cells;
             EXPECT_LE(run.outcome.unsettled, 1) << scene.name << cells;

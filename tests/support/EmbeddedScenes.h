@@ -1,6 +1,5 @@
 #pragma once
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -19,39 +18,23 @@ struct EmbeddedScene {
         btRigidBody& body;
         std::function<void(double time)> move = nullptr;
     };
-    /// What a run has cost, and been at worst.
-    struct Run {
-        SheetOutcome outcome;                 ///< deepest: of a vertex that began outside of the body
-        int steps = 0, solves = 0, most = 0;  ///< most: solves of one step
-        double seconds = 0.0, longest = 0.0;  ///< of all steps, of one [s]
-        double stretch = 0.0;                 ///< of an edge [-]
-    };
-
     const char* name;
     double fastest;  ///< a vertex that moves faster was thrown [m/s]
     std::function<Held(BulletScene&, const ShellMaterial&, int cells)> make;
 
-    Run run(const ShellMaterial& material, int cells, double h, double seconds = 2.0) const {
-        using Clock = std::chrono::steady_clock;
+    /// Deepest is a vertex that began outside of the body.
+    SheetRun run(const ShellMaterial& material, int cells, double h, double seconds = 2.0) const {
         BulletScene scene;
         const Held held = make(scene, material, cells);
         const std::vector<int> outside = verticesOutside(held);
-        Run run;
+        SheetRun run;
         for (double t = 0.0; t < seconds - 0.5 * h; t += h) {
             if (held.move) held.move(t + h);
-            const auto before = Clock::now();
-            scene.step(h);
-            const double took = std::chrono::duration<double>(Clock::now() - before).count();
-            const int solves = scene.shells->lastStep().solves;
-            run.seconds += took;
-            run.longest = std::max(run.longest, took);
-            run.solves += solves;
-            run.most = std::max(run.most, solves);
-            run.stretch = std::max(run.stretch, held.sheet.shell().maxStretch());
-            double depth = 0.0;
-            for (const int vertex : outside) depth = std::max(depth, -distance(held, vertex));
-            run.outcome.note(scene, held.sheet, depth);
-            ++run.steps;
+            run.step(scene, held.sheet, h, [&] {
+                double depth = 0.0;
+                for (const int vertex : outside) depth = std::max(depth, -distance(held, vertex));
+                return depth;
+            });
         }
         return run;
     }

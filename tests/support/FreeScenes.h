@@ -1,6 +1,5 @@
 #pragma once
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -16,12 +15,9 @@ using Bodies = std::vector<btRigidBody*>;
 
 /// A sheet of 1.2 m among bodies that move freely: tests run some, free_bench all.
 struct FreeScene {
-    /// What a run has cost, and been at worst.
-    struct Run {
-        SheetOutcome outcome;
-        int steps = 0, solves = 0, iterations = 0;
-        double seconds = 0.0, longest = 0.0;  ///< of all steps, of one [s]
-        double lowest = 1e300;                ///< where a body's centre is at the end [m]
+    struct Run : SheetRun {
+        int iterations = 0;
+        double lowest = 1e300;  ///< where a body's centre is at the end [m]
     };
 
     const char* name;
@@ -31,24 +27,18 @@ struct FreeScene {
 
     /// From one of several starts, which a few millimetres tell apart.
     Run run(const ShellMaterial& material, int cells, int start, double h = kStep) const {
-        using Clock = std::chrono::steady_clock;
         BulletScene scene;
         scene.addFloor();
         Bodies bodies;
         auto& sheet = make(scene, material, cells, {0.007 * start, 0.0, 0.005 * (start % 3)}, bodies);
         Run run;
         for (double t = 0.0; t < lasts; t += h) {
-            const auto before = Clock::now();
-            scene.step(h);
-            const double seconds = std::chrono::duration<double>(Clock::now() - before).count();
-            run.seconds += seconds;
-            run.longest = std::max(run.longest, seconds);
-            run.solves += scene.shells->lastStep().solves;
+            run.step(scene, sheet, h, [&] {
+                double depth = 0.0;
+                for (const btRigidBody* body : bodies) depth = std::max(depth, penetration(sheet, *body));
+                return depth;
+            });
             run.iterations += scene.shells->lastStep().pcgIterations;
-            double depth = 0.0;
-            for (const btRigidBody* body : bodies) depth = std::max(depth, penetration(sheet, *body));
-            run.outcome.note(scene, sheet, depth);
-            ++run.steps;
         }
         for (const btRigidBody* body : bodies)
             run.lowest = std::min(run.lowest, double(body->getWorldTransform().getOrigin().y()));

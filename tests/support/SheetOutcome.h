@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <chrono>
 
 #include "support/BulletScene.h"
 
@@ -24,6 +25,43 @@ struct SheetOutcome {
         if (unsettled > 5) return "unsettled";
         if (shoved > 5e-3) return "shoved";
         return nullptr;
+    }
+};
+
+/// What a run has cost, and been at worst.
+struct SheetRun {
+    SheetOutcome outcome;
+    int steps = 0, solves = 0, most = 0;  ///< most: solves of one step
+    double seconds = 0.0, longest = 0.0;  ///< of all steps, of one [s]
+    double stretch = 0.0;                 ///< of an edge [-]
+
+    /// Steps the scene. `depth()`: of the sheet in bodies then [m].
+    template <class Depth>
+    void step(BulletScene& scene, const ShellBody& sheet, double h, Depth depth) {
+        using Clock = std::chrono::steady_clock;
+        const auto before = Clock::now();
+        scene.step(h);
+        const double took = std::chrono::duration<double>(Clock::now() - before).count();
+        const int ofStep = scene.shells->lastStep().solves;
+        ++steps;
+        seconds += took;
+        longest = std::max(longest, took);
+        solves += ofStep;
+        most = std::max(most, ofStep);
+        stretch = std::max(stretch, sheet.shell().maxStretch());
+        outcome.note(scene, sheet, depth());
+    }
+    /// Takes together with another run: sums, and the worst of both.
+    void add(const SheetRun& other) {
+        steps += other.steps;
+        solves += other.solves;
+        seconds += other.seconds;
+        most = std::max(most, other.most);
+        longest = std::max(longest, other.longest);
+        stretch = std::max(stretch, other.stretch);
+        outcome.deepest = std::max(outcome.deepest, other.outcome.deepest);
+        outcome.fastest = std::max(outcome.fastest, other.outcome.fastest);
+        outcome.unsettled += other.outcome.unsettled;
     }
 };
 
