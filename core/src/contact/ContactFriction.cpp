@@ -34,7 +34,7 @@ void ContactResponse::addFriction(const Touch& touch, Mat3& damping, Vec3& load)
 
 /// Whether some contact's change is worth another solve.
 bool ContactResponse::updateFriction(const CoupledSystem& system) {
-    if (++m_frictionRounds > kFrictionRounds) return false;
+    if (++m_frictionRounds > kFrictionRounds) return loosenExcess(system);
     double most = 0.0;
     for (const Touch& touch : m_touches) most = std::max(most, touch.contact.friction * touch.pressing);
     bool isWorthIt = false;
@@ -61,10 +61,43 @@ bool ContactResponse::updateFrictionQuickly(bool rough) {
         if (!touch.active || touch.jammed || limit <= 0.0) continue;
         sum += limit;
         if (!touch.slip.known) fresh += limit;
-        excess += std::max(0.0, (touch.impulse - touch.pressing * touch.contact.normal).norm() - limit);
+        excess += std::max(0.0, heldBy(touch).norm() - limit);
         if (!rough || !touch.slip.known) updateCreeping(touch);
     }
     return fresh > kMuch * sum || excess > kMuchTooMuch * sum;
+}
+
+/// Where friction is not looked for any more in a step, but what sticks holds by far more than Coulomb allows, as in a
+/// sheet that is pulled at and comes loose ring by ring: all of it that holds too much slides from now on. Whether
+/// there was any.
+bool ContactResponse::loosenExcess(const CoupledSystem& system) {
+    constexpr double kFarTooMuch = 10.0;  // of all friction
+    double sum = 0.0, excess = 0.0;
+    for (const Touch& touch : m_touches) {
+        if (!touch.active || touch.jammed) continue;
+        const double limit = touch.contact.friction * std::max(touch.pressing, 0.0);
+        sum += limit;
+        if (touch.sticks) excess += std::max(0.0, heldBy(touch).norm() - limit);
+    }
+    if (excess <= kFarTooMuch * sum) return false;
+    for (Touch& touch : m_touches) {
+        const Vec3 held = heldBy(touch);
+        const double most = kMostFriction * touch.contact.friction * std::max(touch.pressing, 0.0);
+        if (touch.active && !touch.jammed && touch.sticks && held.norm() > most)
+            slideFrom(touch, held, vertexStiffness(system, touch));
+    }
+    return true;
+}
+
+/// Friction that held by that impulse, which is more than its limit, gives its limit the same way. `stiffness`: impulse
+/// over velocity of its vertices [kg].
+void ContactResponse::slideFrom(Touch& touch, const Vec3& held, double stiffness) {
+    const double limit = touch.contact.friction * std::max(touch.pressing, 0.0), force = held.norm();
+    touch.sticks = false;
+    touch.slip.known = true;
+    touch.slip.limit = limit;
+    touch.slip.direction = -held / force;
+    touch.slip.speed = (force - limit) / stiffness;  // what the excess would give these vertices alone
 }
 
 /// Coulomb's law with a ramp below the speed of creep: the gradient of a convex function of the sliding velocity.
@@ -103,8 +136,7 @@ void ContactResponse::dropFriction(Touch& touch) {
 /// one would be thrown aside.
 void ContactResponse::dropExcessFriction() {
     for (Touch& touch : m_touches) {
-        const double force = (touch.impulse - touch.pressing * touch.contact.normal).norm();
-        const double limit = touch.contact.friction * std::max(touch.pressing, 0.0);
+        const double force = heldBy(touch).norm(), limit = touch.contact.friction * std::max(touch.pressing, 0.0);
         if (!touch.active || force <= kMostFriction * limit) continue;
         dropFriction(touch);
     }
@@ -114,18 +146,14 @@ void ContactResponse::dropExcessFriction() {
 /// worth another solve [N s]; `stiffness`: impulse over velocity of its vertices [kg].
 double ContactResponse::updateSticking(Touch& touch, double matters, double stiffness) const {
     const double limit = touch.contact.friction * touch.pressing;
-    const Vec3 held = touch.impulse - touch.pressing * touch.contact.normal;
+    const Vec3 held = heldBy(touch);
     const double force = held.norm();
     if (force <= limit + 0.05 * matters) {
         touch.slip.held = held;
         return touch.isRow ? touch.kappa * touch.slide.norm() : 0.0;
     }
-    touch.sticks = false;
+    slideFrom(touch, held, stiffness);
     ++touch.flips;
-    touch.slip.known = true;
-    touch.slip.limit = limit;
-    touch.slip.direction = -held / force;
-    touch.slip.speed = (force - limit) / stiffness;  // what the excess would give these vertices alone
     return std::max(limit, force - limit);
 }
 
@@ -164,7 +192,7 @@ double ContactResponse::updateSliding(Touch& touch, double matters, double stiff
     const bool damped = turns || touch.flips >= kMostFlips || slip.speed == 0.0;
     slip.direction = damped ? Vec3::Zero() : Vec3(touch.slide / slip.speed);
     if (damped && std::isfinite(old.speed)) slip.speed = std::max(slip.speed, old.speed);
-    const double force = (touch.impulse - touch.pressing * touch.contact.normal).norm();
+    const double force = heldBy(touch).norm();
     if (force > kMostFriction * slip.limit + matters) return force;  // it slid much faster than was foreseen
     return (slip.limit * slip.direction - (old.known ? old.limit : 0.0) * old.direction).norm();
 }

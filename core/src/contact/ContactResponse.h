@@ -254,6 +254,10 @@ class ContactResponse {
     void addFriction(const Touch& touch, Mat3& damping, Vec3& load) const;
     bool updateFriction(const CoupledSystem& system);
     bool updateFrictionQuickly(bool rough);
+    bool loosenExcess(const CoupledSystem& system);
+    static void slideFrom(Touch& touch, const Vec3& held, double stiffness);
+    /// What a contact gives besides its normal impulse, and what the solve left over there [N s].
+    static Vec3 heldBy(const Touch& touch) { return touch.impulse - touch.pressing * touch.contact.normal; }
     bool updateQuickly(const IslandVelocities& solved, const Points& y, int round, bool rough);
     bool closeFound(const IslandVelocities& solved, int round);
     bool isAnyDeep() const;
