@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "BodyTwist.h"
 #include "Convert.h"
@@ -59,6 +60,11 @@ class JointInfo {
     double m_damping = 1.0;
 };
 
+/// Of an impulse. What Bullet calls infinity is a number, and above it nothing is.
+double limitOf(btScalar value) {
+    return value < SIMD_INFINITY ? double(value) : std::numeric_limits<double>::infinity();
+}
+
 }  // namespace
 
 double mobilityAlong(const btRigidBody& body, const Vec6& row) {
@@ -76,13 +82,13 @@ void readJoint(btTypedConstraint& joint, const btContactSolverInfo& solver, doub
     const JointInfo info(joint, solver, h, rows.get_allocator().resource());
     joint.internalSetAppliedImpulse(applied);
     const btRigidBody &first = joint.getRigidBodyA(), &second = joint.getRigidBodyB();
-    const double most = double(joint.getBreakingImpulseThreshold());
     for (const JointInfo::Row& row : info.rows()) {
         const Vec6 alongFirst = row.along(0), alongSecond = row.along(1);
         const double mobility = mobilityAlong(first, alongFirst) + mobilityAlong(second, alongSecond);
         const double velocity = alongFirst.dot(freeTwistOf(first, h)) + alongSecond.dot(freeTwistOf(second, h));
         const double kept = double(row.error) + (1.0 - info.damping()) * velocity;
-        const ImpulseRange range{std::max(double(row.lower), -most), std::min(double(row.upper), most)};
+        const ImpulseRange range{-limitOf(std::min(-row.lower, joint.getBreakingImpulseThreshold())),
+                                 limitOf(std::min(row.upper, joint.getBreakingImpulseThreshold()))};
         const bool isIdle = range.least == 0.0 && range.most == 0.0;  // a motor without force
         if (isIdle || !(mobility > 0.0) || !std::isfinite(mobility) || !std::isfinite(kept)) continue;
         rows.push_back({&first, &second, alongFirst, alongSecond, kept, double(row.cfm) * mobility, range});

@@ -39,6 +39,7 @@ bool ContactResponse::bounce(const IslandVelocities& solved) {
         } else if (touch.normalImpulse > 0.0 && speed > touch.target && speed > 0.0 && !touch.jammed) {
             touch.bounces = true;
             touch.target = speed;
+            touch.missed = 0.0;
             changed = true;
         }
     }

@@ -213,7 +213,8 @@ bool ContactResponse::closeAtEnd(const Contact& contact, const IslandVelocities&
     const int known = touchOf(contact);
     const bool fresh = known < 0;
     const bool held = !fresh && m_touches[known].active;
-    if (held && m_touches[known].jammed) return false;
+    const bool isVain = held && m_touches[known].isVain && m_touches[known].dynamicBody >= 0;
+    if (isVain || (held && m_touches[known].jammed)) return false;
     const double lacks = missing(contact, known);
     if (lacks > -slopOf(contact)) return false;
     const bool isNewFace = !contact.isVertex() && !held;
@@ -282,7 +283,7 @@ void ContactResponse::aim(Touch& touch, double lacks, const IslandVelocities& so
         double start = before + touch.allowedGap;
         // No deeper than anything was: beside a round body that goes far, what is outside seems to come from inside.
         if (m_partOfStep < 1.0 || isTakenOut(contact.body)) start = std::max(start, m_gapAtStart[contact.body]);
-        const double out = m_input.h * speedOutOf(-start, contact);
+        const double out = m_input.h * speedOutOf(-start, touch);
         take = lacks + touch.allowedGap - (start < 0.0 ? std::min(0.0, start + out) : 0.0);
     }
     touch.allowedGap += lacks - take;

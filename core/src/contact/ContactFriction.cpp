@@ -157,11 +157,10 @@ double ContactResponse::updateSticking(Touch& touch, double matters, double stif
     return std::max(limit, force - limit);
 }
 
-/// What a free body opposes to an impulse at a contact, along unit t [kg].
-double ContactResponse::bodyInertia(const Touch& touch, const Vec3& t) const {
-    Vec6 along;
-    along << t, touch.arm.cross(t);
-    return 1.0 / along.dot(m_input.bodies[touch.contact.body].mass.ldlt().solve(along));
+/// What a free body of that mass opposes to an impulse at a contact, along unit t [kg].
+double ContactResponse::bodyInertia(const Mat6& mass, const Touch& touch, const Vec3& t) {
+    const Vec6 along = rowOf(touch, t);
+    return 1.0 / along.dot(mass.ldlt().solve(along));
 }
 
 /// Whether sliding friction would turn the sliding of a free body around, rather than slow it down: at once if the body
@@ -169,7 +168,7 @@ double ContactResponse::bodyInertia(const Touch& touch, const Vec3& t) const {
 bool ContactResponse::wouldTurn(const Touch& touch, double limit, double stiffness) const {
     const double speed = touch.slide.norm();
     if (touch.dynamicBody < 0 || speed == 0.0) return false;
-    const double body = bodyInertia(touch, touch.slide / speed);
+    const double body = bodyInertia(m_input.bodies[touch.contact.body].mass, touch, touch.slide / speed);
     return limit * (1.0 / body + 1.0 / stiffness) > speed;
 }
 

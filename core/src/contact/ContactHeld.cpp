@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "contact/ContactResponse.h"
 
@@ -20,6 +21,27 @@ double ContactResponse::freeWeights(const Contact& contact) const {
     return sum;
 }
 
+/// Whether a free body stands inside what something holds, and so deep that it is to be closed: pushOut cannot take the
+/// one out of the other.
+bool ContactResponse::isAnyStuck() const {
+    return std::any_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
+        return m_dynamicIndex[contact.body] >= 0 && freeWeights(contact) <= kLeastFree &&
+               missing(contact, touchOf(contact)) < -slopOf(contact);
+    });
+}
+
+/// What is held, and the vertices around it: a free body near these may be on its way to an edge between two pins.
+void ContactResponse::findBesideHeld() {
+    m_besideHeld = m_held;
+    if (!hasFreeBodies()) return;
+    for (std::size_t k = 0; k < m_input.shells.size(); ++k)
+        for (const HalfEdgeMesh::Edge& edge : m_input.shells[k]->mesh().edges()) {
+            const int a = m_offsets[k] + edge.v0, b = m_offsets[k] + edge.v1;
+            if (m_held[a]) m_besideHeld[b] = 1;
+            if (m_held[b]) m_besideHeld[a] = 1;
+        }
+}
+
 /// Whether some vertex may be held, by a pin or a wall, where a free body touches it: in a sheet that is pinned by its
 /// edge only those near the edge are, and the others need no faces.
 bool ContactResponse::mayBeBacked() const {
@@ -27,7 +49,7 @@ bool ContactResponse::mayBeBacked() const {
     const bool areAllHeld = std::find(m_held.begin(), m_held.end(), 0) == m_held.end();
     const bool isAnyWall = std::find(m_dynamicIndex.begin(), m_dynamicIndex.end(), -1) != m_dynamicIndex.end();
     return areAllHeld || isAnyWall || std::any_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
-               return m_dynamicIndex[contact.body] >= 0 && m_held[globalVertex(contact, 0)] != 0;
+               return m_dynamicIndex[contact.body] >= 0 && m_besideHeld[globalVertex(contact, 0)] != 0;
            });
 }
 
@@ -70,17 +92,54 @@ bool ContactResponse::isSurface(const Contact& contact) const {
     return (m_stiff[contact.shell] && m_dynamicIndex[contact.body] >= 0) || isBacked(contact);
 }
 
-/// Where something else holds all vertices of a contact, the body is what must give way: its mass counts, not theirs
-/// [kg].
-double ContactResponse::pinchedMass(const Touch& touch) const {
-    if (touch.dynamicBody < 0) return 0.0;
+/// Where a pin or another body holds vertices of a contact, bodies are what must give way, its own or the one that they
+/// are tied to: how heavy these and the vertices that are free, by their share, are together along it. Vertices that
+/// other contacts hold count where all are held. 0: it is not so [kg].
+double ContactResponse::pinchedMass(const CoupledSystem& system, const Touch& touch) const {
+    const Contact& c = touch.contact;
+    const auto mobilityOf = [&](int body) {
+        return m_dynamicIndex[body] < 0 ? 0.0 : 1.0 / m_input.bodies[body].lightest();
+    };
+    bool isAnyHeld = false, isAnyFree = false;
+    int holder = c.body;  // to which vertices are tied
+    double ofVertices = 0.0, tied = 0.0;
     for (int a = 0; a < 3; ++a) {
-        const int vertex = globalVertex(touch.contact, a);
-        const int filter = m_filterOf[vertex];
+        const int vertex = globalVertex(c, a), filter = m_filterOf[vertex];
         const bool isTaken = filter >= 0 && m_touches[m_filters[filter].touches[0]].dynamicBody != touch.dynamicBody;
-        if (touch.contact.weights[a] > 0.0 && !m_held[vertex] && !isTaken) return 0.0;
+        const double weight = c.weights[a];
+        if (weight == 0.0 || m_tied.count({vertex, c.body}) > 0) continue;
+        isAnyHeld |= m_held[vertex] != 0;
+        isAnyFree |= !m_held[vertex] && !isTaken;
+        const auto tie = m_tied.lower_bound({vertex, 0});
+        if (!m_held[vertex]) {
+            const Mat3& stiffness = system.shells()[c.shell].matrix->diagonal()[c.vertices[a]];
+            ofVertices += weight * weight / c.normal.dot(stiffness * c.normal);
+        } else if (tie != m_tied.end() && tie->first == vertex) {
+            holder = tie->second;
+            tied += weight;
+        }
     }
-    return m_input.bodies[touch.contact.body].mass.diagonal().head<3>().minCoeff();
+    const double ofBodies = mobilityOf(c.body) + tied * tied * mobilityOf(holder);
+    if (ofBodies == 0.0 || (!isAnyHeld && isAnyFree)) return 0.0;
+    if (!isAnyHeld) return m_input.bodies[c.body].mass.diagonal().head<3>().minCoeff();
+    return 1.0 / (isAnyFree ? ofBodies + ofVertices : ofBodies);
+}
+
+/// Whether neither side of a contact gives way: something holds its vertices, and what bears the free body, or joins it
+/// to others, holds that. How deep the one is in the other is then not to be taken back: made exact, the impulses that
+/// this takes would grow without bound.
+bool ContactResponse::isWedged(const Touch& touch) const {
+    constexpr double kFast = 100.0;  // times as heavy as the body alone
+    const CoupledBody& body = m_input.bodies[touch.contact.body];
+    if (touch.dynamicBody < 0 || body.supports.empty() || !isHeld(touch.contact)) return false;
+    Mat6 mass = body.mass;
+    for (const BodySupport& support : body.supports) {
+        const bool isAlong = support.row.dot(rowOf(touch, touch.contact.normal)) > 0.0;
+        const double most = isAlong ? support.range.most : -support.range.least;
+        if (!std::isinf(most)) mass -= support.weight * support.row * support.row.transpose();
+    }
+    return bodyInertia(mass, touch, touch.contact.normal) >
+           kFast * bodyInertia(body.ownMass(), touch, touch.contact.normal);
 }
 
 /// Whether a contact of a free body has a vertex that another one holds.

@@ -164,6 +164,7 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
         m_held[vertex] = 1;
         m_tied.insert({vertex, anchor.body});
     }
+    findBesideHeld();
     findChords();
     m_bearsNoBody = false;
     if (!input.contacts) return;
@@ -277,11 +278,11 @@ double ContactResponse::slackAt(const Contact& contact) const {
     return least;
 }
 
-/// The deepest of each body.
+/// The deepest of each body; of a free one also what cannot be moved out of it.
 void ContactResponse::findGapsAtStart() {
     m_gapAtStart.assign(m_input.bodies.size(), 0.0);
     for (const Contact& contact : m_found)
-        if (freeWeights(contact) > kLeastFree)
+        if (m_dynamicIndex[contact.body] >= 0 || freeWeights(contact) > kLeastFree)
             m_gapAtStart[contact.body] = std::min(m_gapAtStart[contact.body], contact.gap);
 }
 
@@ -289,8 +290,8 @@ bool ContactResponse::hasFreeBodies() const {
     return std::any_of(m_dynamicIndex.begin(), m_dynamicIndex.end(), [](int body) { return body >= 0; });
 }
 
-/// Whether rigid contacts bear every free body, none is lighter than the shells, and no shell bears one. Among walls
-/// that stand still.
+/// Whether rigid contacts bear every free body, none is lighter than the shells, and no shell bears one, nor stands in
+/// its way by what is held. Among walls that stand still.
 bool ContactResponse::areBorneByOthers() const {
     const double mass = m_input.shellMass();
     const auto isBorne = [&](int b) {
@@ -303,7 +304,7 @@ bool ContactResponse::areBorneByOthers() const {
         if (body.prescribed ? isLed(b) : !isBorne(b) || body.lightest() < mass) return false;
     }
     return std::none_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
-        return !m_input.bodies[contact.body].prescribed && isUnderBody(contact, m_input.gravity);
+        return !m_input.bodies[contact.body].prescribed && (isUnderBody(contact, m_input.gravity) || isHeld(contact));
     });
 }
 
@@ -429,8 +430,9 @@ double ContactResponse::shareTakenBack(const Contact& contact) const {
 
 /// With which a free body leaves a surface that it stands inside and that cannot give way [m/s]: in steps that take
 /// back a share of the depth, and never so fast that it would rise above the surface.
-double ContactResponse::speedOutOf(double depth, const Contact& contact) const {
-    return std::min(shareTakenBack(contact) * depth / m_input.h,
+double ContactResponse::speedOutOf(double depth, const Touch& touch) const {
+    if (isWedged(touch)) return 0.0;
+    return std::min(shareTakenBack(touch.contact) * depth / m_input.h,
                     std::sqrt(std::max(m_input.gravity.norm(), 1e-3) * depth));
 }
 
@@ -538,7 +540,7 @@ void ContactResponse::alter(Touch& touch, Points& y) {
     const Contact& c = touch.contact;
     const bool isHeldThere = isHeld(c);
     if (isBacked(c) || (isHeldThere && !c.isVertex())) {
-        touch.target = speedOutOf(-c.gap, c);
+        touch.target = speedOutOf(-c.gap, touch);
         touch.allowedGap = std::min(0.0, c.gap + m_input.h * touch.target);
         return;
     }
@@ -711,7 +713,9 @@ double ContactResponse::vertexStiffness(const CoupledSystem& system, const Touch
 
 SoftRow ContactResponse::makeRow(Touch& touch, const CoupledSystem& system) const {
     const Contact& c = touch.contact;
-    touch.kappa = kRowPenalty * std::max(vertexStiffness(system, touch), pinchedMass(touch));
+    const double pinched = pinchedMass(system, touch);
+    touch.kappa = kRowPenalty * std::max(vertexStiffness(system, touch), pinched);
+    touch.bodyYields = pinched > 0.0 && isHeld(c);
     touch.isPinched = isBetweenBodies(touch);
     SoftRow row;
     for (int a = 0; a < 3; ++a) row.vertices[a] = globalVertex(c, a);
@@ -761,9 +765,9 @@ bool ContactResponse::update(const CoupledSystem& system, const IslandVelocities
 /// hardly matters is noted for the next step, and pushOut does its part in this one.
 bool ContactResponse::updateQuickly(const IslandVelocities& solved, const Points& y, int round, bool rough) {
     findAtEnd(solved, y);
-    const bool matters = rough || isMuchUnmet();
+    const bool isStuck = isAnyStuck(), matters = rough || isStuck || isMuchUnmet();
     const bool released = releasePulling(round);
-    const bool entered = (round == 0 || isAnyDeep()) && closeFound(solved, round);
+    const bool entered = (round == 0 || isStuck || isAnyDeep()) && closeFound(solved, round);
     const bool slid = updateFrictionQuickly(rough);
     return ((matters && (released || entered)) || slid) && !isLast(round);
 }
@@ -863,13 +867,15 @@ bool ContactResponse::releasePulling(int round) {
     return changed && !isLast(round);
 }
 
-/// As an augmented Lagrangian has it. Between walls that cannot all be met the multipliers would grow without bound:
-/// one that leaves most of what it was raised for is put back, and the penalty alone holds that contact in this step.
+/// As an augmented Lagrangian has it. Between walls that cannot all be met, and between what is held and a body that
+/// something else holds, the multipliers would grow without bound: one that leaves most of what it was raised for is
+/// put back, and the penalty alone holds that contact in this step.
 void ContactResponse::raiseMultiplier(Touch& touch) const {
     constexpr double kVain = 0.5;  // of what was missing
     const double missing = (touch.normalImpulse - touch.lambda) / touch.kappa;
-    const bool isVain = touch.dynamicBody < 0 && touch.missed > 0.0 && missing > kVain * touch.missed &&
-                        missing * m_input.h > m_vertexSlop;
+    const bool isWall = touch.dynamicBody < 0 || touch.bodyYields;
+    const bool isVain =
+        isWall && touch.missed > 0.0 && missing > kVain * touch.missed && missing * m_input.h > m_vertexSlop;
     touch.isVain = touch.isVain || touch.jammed || isVain;
     touch.lambda = touch.isVain ? 0.0 : std::max(touch.normalImpulse, 0.0);
     touch.missed = missing;

@@ -122,12 +122,13 @@ class ContactResponse {
         int flips = 0;    ///< between sticking and sliding, in this step
         int changes = 0;  ///< how often it was activated or dropped
         bool active = false, sticks = false, isRow = false;
-        bool isPlaced = false;   ///< where the end of a solve found it
-        bool isVain = false;     ///< its multiplier does not help: others hold it where it is
-        bool isPinched = false;  ///< a soft row of vertices that another body holds
-        bool bounces = false;    ///< its target is that of restitution
-        bool jammed = false;     ///< walls on both sides leave it no room
-        bool pressed = false;    ///< a wall faces it: it is not to be kept off the surface
+        bool isPlaced = false;    ///< where the end of a solve found it
+        bool isVain = false;      ///< its multiplier does not help: others hold it where it is
+        bool bodyYields = false;  ///< a soft row of held vertices: see pinchedMass
+        bool isPinched = false;   ///< a soft row of vertices that another body holds
+        bool bounces = false;     ///< its target is that of restitution
+        bool jammed = false;      ///< walls on both sides leave it no room
+        bool pressed = false;     ///< a wall faces it: it is not to be kept off the surface
     };
     /// How exactly a step's contacts are settled; what remains is left to the next step.
     struct Care {
@@ -181,6 +182,12 @@ class ContactResponse {
     static bool isFacing(const Contact& a, const Contact& b) { return a.normal.dot(b.normal) < -0.7; }
     /// Projector on the directions across a normal.
     static Mat3 tangential(const Vec3& n) { return Mat3::Identity() - n * n.transpose(); }
+    /// Velocity of a body's point along unit t, from the body's twist.
+    static Vec6 rowOf(const Touch& touch, const Vec3& t) {
+        Vec6 row;
+        row << t, touch.arm.cross(t);
+        return row;
+    }
     Key keyOf(const Contact& c) const;
     Key keyOf(int shell, int body, int feature) const {
         return {m_input.shells[shell], m_input.bodies[body].key, feature};
@@ -218,6 +225,7 @@ class ContactResponse {
     void rememberEmbedded();
     bool isHeldInside(const Contact& contact) const;
     void dropHeldInside();
+    void findBesideHeld();
     bool mayBeBacked() const;
     void findBacked();
     bool isBacked(const Contact& contact) const;
@@ -229,7 +237,7 @@ class ContactResponse {
     double slackAt(const Contact& contact) const;
     bool leavesSlowly(const Contact& contact) const;
     double shareTakenBack(const Contact& contact) const;
-    double speedOutOf(double depth, const Contact& contact) const;
+    double speedOutOf(double depth, const Touch& touch) const;
     void dropPassed();
     static bool isBeside(const Contact& contact, const Contact& face);
     double slopOf(const Contact& contact) const;
@@ -244,7 +252,8 @@ class ContactResponse {
     void finishFilter(VertexFilter& filter, VertexConstraint& constraint);
     SoftRow makeRow(Touch& touch, const CoupledSystem& system) const;
     bool isBetweenBodies(const Touch& touch) const;
-    double pinchedMass(const Touch& touch) const;
+    bool isWedged(const Touch& touch) const;
+    double pinchedMass(const CoupledSystem& system, const Touch& touch) const;
     double vertexStiffness(const CoupledSystem& system, const Touch& touch) const;
     void letGo(Touch& touch) const;
     bool releasePulling(int round);
@@ -261,6 +270,7 @@ class ContactResponse {
     bool updateQuickly(const IslandVelocities& solved, const Points& y, int round, bool rough);
     bool closeFound(const IslandVelocities& solved, int round);
     bool isAnyDeep() const;
+    bool isAnyStuck() const;
     bool isMuchUnmet() const;
     double missing(const Contact& contact, int touch) const;
     Vec3 armAtEnd(const Contact& contact) const;
@@ -269,7 +279,7 @@ class ContactResponse {
     void dropExcessFriction();
     double updateSticking(Touch& touch, double matters, double stiffness) const;
     double updateSliding(Touch& touch, double matters, double stiffness) const;
-    double bodyInertia(const Touch& touch, const Vec3& t) const;
+    static double bodyInertia(const Mat6& mass, const Touch& touch, const Vec3& t);
     bool wouldTurn(const Touch& touch, double limit, double stiffness) const;
     void updateCreeping(Touch& touch) const;
     bool creeps(const Touch& touch) const { return isQuick() && touch.slip.known && touch.slide.norm() <= m_creep; }
@@ -311,6 +321,7 @@ class ContactResponse {
     std::pmr::map<Key, Memory> m_memory{&m_pool};
     double m_memoryStep = 0.0;
     std::vector<char> m_held;              ///< pinned or anchored
+    std::vector<char> m_besideHeld;        ///< see findBesideHeld
     std::vector<double> m_reach;           ///< of each vertex: see findReach [m]
     std::vector<const double*> m_reachOf;  ///< where that of each shell begins
     std::vector<double> m_edge;            ///< mean edge length of each shell [m]

@@ -1,0 +1,42 @@
+// Bodies that meet what a pin or an anchor holds of a shell, while joints or masses hold them.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "support/UseScenes.h"
+
+namespace jacket::bullet::testing {
+namespace {
+
+/// Vertices that are tied to a heavy body stop it where they meet a pole. While they opposed the pole with no more than
+/// their own weight, it came 1 to 96 mm into panels, and rubber was thrown at up to 195 m/s.
+TEST(Held, APanelOnACarStopsItAtAPole) {
+    const UseScene scene = use_scenes::carPanel("");
+    for (const std::string& material : scene.materials)
+        for (const double h : {1.0 / 60, 1.0 / 240}) {
+            SCOPED_TRACE(material + " in steps of " + std::to_string(h) + " s");
+            const UseScene::Run run = scene.run(material, 1, h);
+            EXPECT_EQ(run.outcome.fault(scene.fastest), nullptr) << run.outcome.deepest << " m deep";
+            EXPECT_LT(run.fastestBody, 11.0);
+            EXPECT_LT(run.most, 400);  // solves
+        }
+}
+
+/// Neither a pin nor a hinge gives way: what one may not take back of the other's depth would take impulses without
+/// bound. The door was up to 1e5 m/s fast for a step, and the curtain 2000.
+TEST(Held, ADoorOnAHingeComesToRestAtPins) {
+    for (const double top : {1.9, 1.96}) {
+        const UseScene scene = use_scenes::doorAndCurtain("", top);
+        for (const std::string& material : scene.materials)
+            for (const double h : {1.0 / 60, 1.0 / 240}) {
+                SCOPED_TRACE(material + " in steps of " + std::to_string(h) + " s, door up to " + std::to_string(top));
+                const UseScene::Run run = scene.run(material, 1, h);
+                EXPECT_LT(run.fastestBody, 40.0);
+                EXPECT_LT(run.outcome.fastest, 25.0);
+                EXPECT_LE(run.outcome.unsettled, 5);
+            }
+    }
+}
+
+}  // namespace
+}  // namespace jacket::bullet::testing
