@@ -18,6 +18,7 @@ struct EmbeddedScene {
         btRigidBody& body;
         std::function<void(double time)> move = nullptr;
     };
+
     const char* name;
     double fastest;  ///< a vertex that moves faster was thrown [m/s]
     std::function<Held(BulletScene&, const ShellMaterial&, int cells)> make;

@@ -11,8 +11,6 @@
 
 namespace jacket::bullet::testing {
 
-using Bodies = std::vector<btRigidBody*>;
-
 /// A sheet of 1.2 m among bodies that move freely: tests run some, free_bench all.
 struct FreeScene {
     struct Run : SheetRun {
@@ -33,11 +31,7 @@ struct FreeScene {
         auto& sheet = make(scene, material, cells, {0.007 * start, 0.0, 0.005 * (start % 3)}, bodies);
         Run run;
         for (double t = 0.0; t < lasts; t += h) {
-            run.step(scene, sheet, h, [&] {
-                double depth = 0.0;
-                for (const btRigidBody* body : bodies) depth = std::max(depth, penetration(sheet, *body));
-                return depth;
-            });
+            run.step(scene, sheet, h, [&] { return deepestIn(bodies, sheet); });
             run.iterations += scene.shells->lastStep().pcgIterations;
         }
         for (const btRigidBody* body : bodies)

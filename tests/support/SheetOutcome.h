@@ -1,6 +1,7 @@
 #pragma once
 #include <algorithm>
 #include <chrono>
+#include <vector>
 
 #include "support/BulletScene.h"
 
@@ -27,6 +28,15 @@ struct SheetOutcome {
         return nullptr;
     }
 };
+
+using Bodies = std::vector<btRigidBody*>;
+
+/// Of the sheet in any of them [m].
+inline double deepestIn(const Bodies& bodies, const ShellBody& sheet) {
+    double depth = 0.0;
+    for (const btRigidBody* body : bodies) depth = std::max(depth, penetration(sheet, *body));
+    return depth;
+}
 
 /// What a run has cost, and been at worst.
 struct SheetRun {

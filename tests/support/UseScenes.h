@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "support/SheetOutcome.h"
+#include "support/EmbeddedScenes.h"
 
 namespace jacket::bullet::testing {
 
@@ -16,7 +16,7 @@ struct UseScene {
     /// What is in it; and how the user moves something before the step that ends at a time.
     struct Things {
         ShellBody& sheet;
-        std::vector<btRigidBody*> bodies;
+        Bodies bodies;
         std::function<void(double time)> move = nullptr;
     };
     struct Run : SheetRun {
@@ -36,11 +36,7 @@ struct UseScene {
         Run run;
         for (double t = 0.0; t < seconds - 0.5 * h; t += h) {
             if (things.move) things.move(t + h);
-            run.step(scene, things.sheet, h, [&] {
-                double depth = 0.0;
-                for (const btRigidBody* body : things.bodies) depth = std::max(depth, penetration(things.sheet, *body));
-                return depth;
-            });
+            run.step(scene, things.sheet, h, [&] { return deepestIn(things.bodies, things.sheet); });
             for (const btRigidBody* body : things.bodies)
                 run.fastestBody = std::max(run.fastestBody, double(body->getLinearVelocity().length()));
         }
@@ -51,6 +47,7 @@ struct UseScene {
 namespace use_scenes {
 
 using Things = UseScene::Things;
+using embedded_scenes::verticesWhere;
 
 inline btVector3 vector(double x, double y, double z) {
     return {btScalar(x), btScalar(y), btScalar(z)};
@@ -90,13 +87,8 @@ inline TriangleMesh closedBall(double radius, int rings, const Vec3& middle) {
     mesh.triangles.rightCols(m) = half.triangles.colwise().reverse().array() + int(n);
     return moved(weldSeams(mesh), middle);
 }
-inline void forVertices(ShellBody& sheet, const std::function<bool(const Vec3&)>& are,
-                        const std::function<void(int)>& call) {
-    for (int i = 0; i < sheet.vertexCount(); ++i)
-        if (are(sheet.shell().positions().col(i))) call(i);
-}
 
-const std::vector<std::string> kSoft{"cotton", "rubber", "paper"}, kInflated{"rubber", "cotton", "pet"},
+inline const std::vector<std::string> kSoft{"cotton", "rubber", "paper"}, kInflated{"rubber", "cotton", "pet"},
     kStiff{"steel", "aluminium", "pet", "rubber"};
 
 /// A panel on the front of a car of 800 kg, which drives into a pole at 10 m/s.
@@ -127,8 +119,7 @@ inline UseScene doorAndCurtain(const char* name, double top) {
                 scene.addJoint(std::move(hinge));
                 auto& curtain =
                     scene.shells->add(upright(1.6, 1.6, 12 * fineness, 12 * fineness, {0.3, 1.1, 0.0}), material);
-                forVertices(
-                    curtain, [](const Vec3& x) { return x.y() > 1.899; }, [&](int i) { curtain.pin(i); });
+                for (const int i : verticesWhere(curtain, [](const Vec3& x) { return x.y() > 1.899; })) curtain.pin(i);
                 return {curtain, {&door}};
             }};
 }
@@ -143,8 +134,7 @@ inline UseScene walkerAndCurtain(const char* name) {
                 walker.setActivationState(DISABLE_DEACTIVATION);
                 auto& curtain =
                     scene.shells->add(upright(1.8, 1.8, 12 * fineness, 12 * fineness, {0.0, 1.1, 0.0}), material);
-                forVertices(
-                    curtain, [](const Vec3& x) { return x.y() > 1.999; }, [&](int i) { curtain.pin(i); });
+                for (const int i : verticesWhere(curtain, [](const Vec3& x) { return x.y() > 1.999; })) curtain.pin(i);
                 return {curtain, {&floor, &walker}, [&walker](double t) {
                             const double fall = double(walker.getLinearVelocity().y());
                             walker.setLinearVelocity(vector(0, fall, t < 1.6 ? 1.5 : -1.5));
@@ -157,7 +147,7 @@ inline UseScene balloon(const char* name, double pressure, double height, double
     return {name, 3.0, 8.0, kInflated, [=](auto& scene, auto& material, int fineness) -> Things {
                 auto& sheet = scene.shells->add(closedBall(0.3, 4 * fineness, {0, height, 0}), material);
                 sheet.shell().setPressure(pressure);
-                std::vector<btRigidBody*> bodies{&scene.addFloor()};
+                Bodies bodies{&scene.addFloor()};
                 if (mass > 0.0) bodies.push_back(&scene.addBox(vector(0.2, 0.1, 0.2), mass, vector(0.02, 1.0, 0)));
                 return {sheet, bodies};
             }};
@@ -188,7 +178,7 @@ inline UseScene kickedBalloon(const char* name) {
 inline UseScene filledBowl(const char* name, bool areMarbles) {
     return {name, 3.0, 6.0, kStiff, [=](auto& scene, auto& material, int fineness) -> Things {
                 auto& sheet = scene.shells->add(moved(bowl(0.2, 4 * fineness), {0, 1e-3, 0}), material);
-                std::vector<btRigidBody*> bodies{&scene.addFloor()};
+                Bodies bodies{&scene.addFloor()};
                 for (int i = 0; i < (areMarbles ? 8 : 4); ++i) {
                     const double turn = 2.4 * i, off = areMarbles ? 0.06 : 0.04;
                     const auto at =
@@ -236,7 +226,7 @@ inline UseScene bag(const char* name) {
                 rim.push_back(i);
                 at.push_back(sheet.positions()[i]);
             }
-            std::vector<btRigidBody*> bodies;
+            Bodies bodies;
             for (int i = 0; i < 6; ++i)
                 bodies.push_back(&addBall(
                     scene, 0.06, 0.2, vector(0.09 * std::cos(1.05 * i), 0.95 + 0.02 * i, 0.09 * std::sin(1.05 * i))));
@@ -255,10 +245,10 @@ inline UseScene bola(const char* name) {
                     material);
                 auto& left = addBall(scene, 0.05, 0.3, vector(-0.45, 1, 0), vector(2, 2, 5));
                 auto& right = addBall(scene, 0.05, 0.3, vector(0.45, 1, 0), vector(2, 2, -3));
-                forVertices(
-                    strip, [](const Vec3& x) { return x.x() < -0.399; }, [&](int i) { strip.anchor(i, left); });
-                forVertices(
-                    strip, [](const Vec3& x) { return x.x() > 0.399; }, [&](int i) { strip.anchor(i, right); });
+                for (const int i : verticesWhere(strip, [](const Vec3& x) { return x.x() < -0.399; }))
+                    strip.anchor(i, left);
+                for (const int i : verticesWhere(strip, [](const Vec3& x) { return x.x() > 0.399; }))
+                    strip.anchor(i, right);
                 return {strip, {&scene.addFloor(), &left, &right}};
             }};
 }
@@ -267,7 +257,7 @@ inline UseScene bola(const char* name) {
 inline UseScene lid(const char* name) {
     return {name, 2.0, 6.0, kStiff, [](auto& scene, auto& material, int fineness) -> Things {
                 auto& sheet = scene.shells->add(moved(squareSheet(0.7, 8 * fineness), {0, 0.5, 0}), material);
-                std::vector<btRigidBody*> bodies{&scene.addFloor()};
+                Bodies bodies{&scene.addFloor()};
                 for (const double side : {-0.3, 0.3}) {
                     bodies.push_back(&scene.addBox(vector(0.02, 0.15, 0.3), 0.0, vector(side, 0.15, 0)));
                     bodies.push_back(&scene.addBox(vector(0.3, 0.15, 0.02), 0.0, vector(0, 0.15, side)));
@@ -278,7 +268,7 @@ inline UseScene lid(const char* name) {
 inline UseScene tent(const char* name) {
     return {name, 2.0, 7.0, kSoft, [](auto& scene, auto& material, int fineness) -> Things {
                 auto& sheet = scene.shells->add(moved(squareSheet(1.2, 10 * fineness), {0, 0.6, 0}), material);
-                std::vector<btRigidBody*> bodies{&scene.addFloor()};
+                Bodies bodies{&scene.addFloor()};
                 for (const double turn : {0.0, 2.1, 4.2})
                     bodies.push_back(&scene.addBody(std::make_unique<btCapsuleShape>(btScalar(0.02), btScalar(0.5)),
                                                     0.0, vector(0.3 * std::cos(turn), 0.25, 0.3 * std::sin(turn))));

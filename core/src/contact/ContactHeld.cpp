@@ -33,7 +33,7 @@ bool ContactResponse::isAnyStuck() const {
 /// What is held, and the vertices around it: a free body near these may be on its way to an edge between two pins.
 void ContactResponse::findBesideHeld() {
     m_besideHeld = m_held;
-    if (!hasFreeBodies()) return;
+    if (!hasFreeBodies() || std::find(m_held.begin(), m_held.end(), 1) == m_held.end()) return;
     for (std::size_t k = 0; k < m_input.shells.size(); ++k)
         for (const HalfEdgeMesh::Edge& edge : m_input.shells[k]->mesh().edges()) {
             const int a = m_offsets[k] + edge.v0, b = m_offsets[k] + edge.v1;
@@ -129,7 +129,7 @@ double ContactResponse::pinchedMass(const CoupledSystem& system, const Touch& to
 /// to others, holds that. How deep the one is in the other is then not to be taken back: made exact, the impulses that
 /// this takes would grow without bound.
 bool ContactResponse::isWedged(const Touch& touch) const {
-    constexpr double kFast = 100.0;  // times as heavy as the body alone
+    constexpr double kMuchHeavier = 100.0;  // than the body alone
     const CoupledBody& body = m_input.bodies[touch.contact.body];
     if (touch.dynamicBody < 0 || body.supports.empty() || !isHeld(touch.contact)) return false;
     Mat6 mass = body.mass;
@@ -139,7 +139,7 @@ bool ContactResponse::isWedged(const Touch& touch) const {
         if (!std::isinf(most)) mass -= support.weight * support.row * support.row.transpose();
     }
     return bodyInertia(mass, touch, touch.contact.normal) >
-           kFast * bodyInertia(body.ownMass(), touch, touch.contact.normal);
+           kMuchHeavier * bodyInertia(body.ownMass(), touch, touch.contact.normal);
 }
 
 /// Whether a contact of a free body has a vertex that another one holds.

@@ -164,11 +164,11 @@ void ContactResponse::begin(const IslandInput& input, const Numbering& numbering
         m_held[vertex] = 1;
         m_tied.insert({vertex, anchor.body});
     }
-    findBesideHeld();
     findChords();
     m_bearsNoBody = false;
     if (!input.contacts) return;
 
+    findBesideHeld();
     m_creep = creepSpeed();
     m_vertexSlop = std::min(5e-5, 1e-3 * shortest);
     m_faceSlop = std::min(2e-4, 1e-2 * shortest);
