@@ -1,74 +1,14 @@
 #pragma once
-#include <algorithm>
 #include <cmath>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "support/EmbeddedScenes.h"
+#include "support/MechanismScenes.h"
+#include "support/UseScene.h"
 
-namespace jacket::bullet::testing {
+namespace jacket::bullet::testing::use_scenes {
 
-/// Things as users build them of a shell and bodies: panels, doors, bags, balloons, hats. Tests run some of them,
-/// uses_bench all.
-struct UseScene {
-    /// What is in it; and how the user moves something before the step that ends at a time.
-    struct Things {
-        ShellBody& sheet;
-        Bodies bodies;
-        std::function<void(double time)> move = nullptr;
-    };
-    struct Run : SheetRun {
-        double fastestBody = 0.0;  ///< [m/s]
-    };
-
-    const char* name;
-    double seconds;
-    double fastest;                      ///< a vertex that moves faster was thrown [m/s]
-    std::vector<std::string> materials;  ///< of `byName`, at their usual thickness
-    /// `fineness`: 1, 2, ...
-    std::function<Things(BulletScene&, const ShellMaterial&, int fineness)> make;
-
-    Run run(const std::string& material, int fineness, double h) const {
-        BulletScene scene;
-        const Things things = make(scene, materials::byName(material), fineness);
-        Run run;
-        for (double t = 0.0; t < seconds - 0.5 * h; t += h) {
-            if (things.move) things.move(t + h);
-            run.step(scene, things.sheet, h, [&] { return deepestIn(things.bodies, things.sheet); });
-            for (const btRigidBody* body : things.bodies)
-                run.fastestBody = std::max(run.fastestBody, double(body->getLinearVelocity().length()));
-        }
-        return run;
-    }
-};
-
-namespace use_scenes {
-
-using Things = UseScene::Things;
-using embedded_scenes::verticesWhere;
-
-inline btVector3 vector(double x, double y, double z) {
-    return {btScalar(x), btScalar(y), btScalar(z)};
-}
-inline btRigidBody& addBall(BulletScene& scene, double radius, double mass, const btVector3& at,
-                            const btVector3& velocity = {0, 0, 0}) {
-    btRigidBody& ball = scene.addSphere(radius, mass, at);
-    ball.setLinearVelocity(velocity);
-    return ball;
-}
-inline void moveTo(btRigidBody& body, const btVector3& at, const btQuaternion& turn = btQuaternion::getIdentity()) {
-    body.setWorldTransform(btTransform(turn, at));
-}
-inline TriangleMesh moved(TriangleMesh mesh, const Vec3& by) {
-    mesh.positions.colwise() += by;
-    return mesh;
-}
-/// Upright, in the plane z = 0 around `middle`.
-inline TriangleMesh upright(double width, double height, int across, int down, const Vec3& middle) {
-    return moved(makeGrid({.size = {width, height}, .cells = {across, down}, .plane = GridPlane::XY}), middle);
-}
 /// Half a sphere that is open above, its lowest point at the origin.
 inline TriangleMesh bowl(double radius, int rings) {
     TriangleMesh mesh = makeHemisphere(radius, rings);
@@ -88,7 +28,7 @@ inline TriangleMesh closedBall(double radius, int rings, const Vec3& middle) {
     return moved(weldSeams(mesh), middle);
 }
 
-inline const std::vector<std::string> kSoft{"cotton", "rubber", "paper"}, kInflated{"rubber", "cotton", "pet"},
+inline const std::vector<std::string> kInflated{"rubber", "cotton", "pet"},
     kStiff{"steel", "aluminium", "pet", "rubber"};
 
 /// A panel on the front of a car of 800 kg, which drives into a pole at 10 m/s.
@@ -277,23 +217,24 @@ inline UseScene tent(const char* name) {
 }
 
 inline std::vector<UseScene> all() {
-    return {carPanel("panel of a car that hits a pole"),
-            doorAndCurtain("door below a curtain's pins", 1.8),
-            doorAndCurtain("door as high as the pins", 1.9),
-            doorAndCurtain("door that the pins stop", 1.96),
-            walkerAndCurtain("walker in a curtain"),
-            balloon("balloon on the floor", 500.0, 0.8, 0.0),
-            balloon("balloon under a box of 5 kg", 1500.0, 0.31, 5.0),
-            pressedBalloon("balloon under a plate"),
-            kickedBalloon("balloon hit by a ball"),
-            filledBowl("bowl of marbles", true),
-            filledBowl("bowl of blocks", false),
-            hat("hat on a head"),
-            bag("bag of balls"),
-            bola("two balls on a strip"),
-            lid("lid on a box"),
-            tent("sheet on three poles")};
+    std::vector<UseScene> scenes{carPanel("panel of a car that hits a pole"),
+                                 doorAndCurtain("door below a curtain's pins", 1.8),
+                                 doorAndCurtain("door as high as the pins", 1.9),
+                                 doorAndCurtain("door that the pins stop", 1.96),
+                                 walkerAndCurtain("walker in a curtain"),
+                                 balloon("balloon on the floor", 500.0, 0.8, 0.0),
+                                 balloon("balloon under a box of 5 kg", 1500.0, 0.31, 5.0),
+                                 pressedBalloon("balloon under a plate"),
+                                 kickedBalloon("balloon hit by a ball"),
+                                 filledBowl("bowl of marbles", true),
+                                 filledBowl("bowl of blocks", false),
+                                 hat("hat on a head"),
+                                 bag("bag of balls"),
+                                 bola("two balls on a strip"),
+                                 lid("lid on a box"),
+                                 tent("sheet on three poles")};
+    for (const UseScene& scene : mechanisms()) scenes.push_back(scene);
+    return scenes;
 }
 
-}  // namespace use_scenes
-}  // namespace jacket::bullet::testing
+}  // namespace jacket::bullet::testing::use_scenes
