@@ -90,9 +90,23 @@ bool ContactResponse::passes(const IslandVelocities& solved, const Points& y, bo
 
 bool ContactResponse::checkEnd(const IslandVelocities& solved, const Points& y, int round) {
     findAtEnd(solved, y);
+    findThrown(solved);
     bool changed = closeFound(solved, round);
     if (m_anyFast) changed |= closeFirst(round);
     return changed && !isLast(round);
+}
+
+/// A contact that lets go too early may throw what it held right through a thin body, where nothing is found at the
+/// end: its way is swept from then on.
+void ContactResponse::findThrown(const IslandVelocities& solved) {
+    for (const Touch& touch : m_touches) {
+        const int body = touch.contact.body;
+        if (touch.active || m_fast[body] || !touch.contact.isVertex()) continue;
+        const Vec3 way = m_input.h * relativeVelocity(touch, solved);
+        if (way.dot(touch.contact.normal) > -2.0 * m_input.bodies[body].inner) continue;
+        m_fast[body] = 1;
+        m_anyFast = true;
+    }
 }
 
 bool ContactResponse::closeFound(const IslandVelocities& solved, int round) {

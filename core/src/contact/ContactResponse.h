@@ -209,6 +209,7 @@ class ContactResponse {
     void moveToEnd(const IslandVelocities& solved, const Points& y);
     ContactSweep wayToEnd(std::span<const char> bodies);
     void sweepToEnd();
+    void findThrown(const IslandVelocities& solved);
     bool closeFirst(int round);
     bool closePassed(const Contact& contact, int round);
     double findReach();
