@@ -325,9 +325,10 @@ void IslandSolver::Impl::solveRounds(const IslandInput& input, StepReport& repor
         lap.addTo(times.solve);
         const bool changed = response.update(system, {v, u.w, unfiltered()}, y, round, roughly);
         lap.addTo(times.contact);
-        // What stiff shells do while their contacts are not settled would tip a body off what bears it.
+        // What stiff shells do while their contacts are not settled would tip a body off what bears it. But motors, and
+        // bodies that only touch, must let go: contacts with shells would press against them ever more.
         const bool isTelling = !preconditioner.isComplete() || (!changed && !response.isLast(round));
-        const bool lifted = isTelling && supports.update(u.w, input.h * input.gravity.norm());
+        const bool lifted = supports.update(u.w, input.h * input.gravity.norm(), !isTelling);
         if (lifted) {
             system.setBodies(supports.masses(), supports.freeTwists(), supports.couplings());
             readFreeTwists();

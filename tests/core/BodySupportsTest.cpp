@@ -171,6 +171,25 @@ TEST(BodySupports, AMotorGivesWhatItHas) {
     }
 }
 
+/// While contacts of shells are not settled, what bears a body stays; a motor lets go, and what only lies on it.
+TEST(BodySupports, MotorsAndPairsLetGoWhileTheGroundHolds) {
+    std::vector<CoupledBody> bodies{falling(1), falling(1)};
+    const BodySupport both[] = {{up(), 0.0, 1e4}, {Vec6::Unit(0), 0.0, 1e4, {-2.0, 2.0}}};
+    bodies[0].supports = both;
+    for (const BodySupport& each : both) bodies[0].mass += each.weight * each.row * each.row.transpose();
+    bodies[0].freeTwist[1] = -1.0 / 10001;
+    BodySupports supports;
+    supports.begin(bodies, {}, std::vector{onTop(1e4)}, {0, 1});
+    Eigen::Matrix<double, 6, Eigen::Dynamic> away(6, 2);
+    away << Vec6::Unit(0) + up(), 2.0 * up();  // 1e4 N s off each
+    EXPECT_TRUE(supports.update(away, 0.1, true));
+    EXPECT_NEAR(supports.freeTwists()[0][0], -2.0, 1e-9);
+    EXPECT_NEAR(supports.masses()[0](1, 1), 10001.0, 1e-9);
+    EXPECT_NEAR(supports.couplings()[0].mass(1, 1), 0.0, 1e-9);
+    EXPECT_TRUE(supports.update(away, 0.1));
+    EXPECT_NEAR(supports.masses()[0](1, 1), 1.0, 1e-9);
+}
+
 /// Two that a motor drives apart.
 TEST(BodySupports, AMotorBetweenBodiesPushesBothAsHardAsItCan) {
     const std::vector<CoupledBody> bodies{falling(1), falling(4)};

@@ -17,6 +17,7 @@ struct ImpulseRange {
     double most = std::numeric_limits<double>::infinity();
 
     bool pulls() const { return least < 0.0; }
+    bool isBounded() const { return std::isfinite(least) && std::isfinite(most); }
     /// In a part of the step.
     ImpulseRange part(double share) const { return {share * least, share * most}; }
 };

@@ -73,6 +73,20 @@ void ContactResponse::findBacked() {
     }
 }
 
+/// Whether a free body touches a vertex from the other side of another one, or may come to in the step: what is between
+/// them gives way to neither.
+bool ContactResponse::isAnySqueezed() {
+    std::pmr::multimap<int, const Contact*> ofFree(&m_pool);  // by vertex
+    for (const Contact& contact : m_found)
+        if (contact.isVertex() && m_dynamicIndex[contact.body] >= 0) ofFree.emplace(globalVertex(contact, 0), &contact);
+    if (ofFree.empty()) return false;
+    return std::any_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
+        const auto [first, last] = ofFree.equal_range(globalVertex(contact, 0));
+        return contact.isVertex() &&
+               std::any_of(first, last, [&](const auto& other) { return isFacing(*other.second, contact); });
+    });
+}
+
 bool ContactResponse::isBacked(const Contact& contact) const {
     if (m_backed.empty()) return false;
     for (int a = 0; a < 3; ++a) {
@@ -121,7 +135,7 @@ double ContactResponse::pinchedMass(const CoupledSystem& system, const Touch& to
     }
     const double ofBodies = mobilityOf(c.body) + tied * tied * mobilityOf(holder);
     if (ofBodies == 0.0 || (!isAnyHeld && isAnyFree)) return 0.0;
-    if (!isAnyHeld) return m_input.bodies[c.body].mass.diagonal().head<3>().minCoeff();
+    if (!isAnyHeld) return m_input.bodies[c.body].lightest();
     return 1.0 / (isAnyFree ? ofBodies + ofVertices : ofBodies);
 }
 

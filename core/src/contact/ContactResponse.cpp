@@ -291,8 +291,8 @@ bool ContactResponse::hasFreeBodies() const {
 }
 
 /// Whether rigid contacts bear every free body, none is lighter than the shells, and no shell bears one, nor stands in
-/// its way by what is held. Among walls that stand still.
-bool ContactResponse::areBorneByOthers() const {
+/// its way by what is held, by a pin or by another body. Among walls that stand still.
+bool ContactResponse::areBorneByOthers() {
     const double mass = m_input.shellMass();
     const auto isBorne = [&](int b) {
         return !m_input.bodies[b].supports.empty() ||
@@ -303,9 +303,10 @@ bool ContactResponse::areBorneByOthers() const {
         const CoupledBody& body = m_input.bodies[b];
         if (body.prescribed ? isLed(b) : !isBorne(b) || body.lightest() < mass) return false;
     }
-    return std::none_of(m_found.begin(), m_found.end(), [&](const Contact& contact) {
+    const auto isInTheWay = [&](const Contact& contact) {
         return !m_input.bodies[contact.body].prescribed && (isUnderBody(contact, m_input.gravity) || isHeld(contact));
-    });
+    };
+    return std::none_of(m_found.begin(), m_found.end(), isInTheWay) && !isAnySqueezed();
 }
 
 /// Whether nothing rests on the contacts or is thrown by them, and nothing squeezes a shell.

@@ -229,6 +229,7 @@ class ContactResponse {
     void findBesideHeld();
     bool mayBeBacked() const;
     void findBacked();
+    bool isAnySqueezed();
     bool isBacked(const Contact& contact) const;
     bool hasSurfaces() const;
     bool isSurface(const Contact& contact) const;
@@ -289,7 +290,7 @@ class ContactResponse {
     double weightOf(double mass) const { return mass * std::max(m_input.gravity.norm(), 1.0); }
     bool hasFreeBodies() const;
     bool isAmongWalls() const;
-    bool areBorneByOthers() const;
+    bool areBorneByOthers();
     bool isAnyStiff() const;
     double creepSpeed() const;
     void findAtEnd(const IslandVelocities& solved, const Points& y);

@@ -172,12 +172,13 @@ void BodySupports::findLoads(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w) 
     }
 }
 
-bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, double kick) {
+bool BodySupports::update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, double kick, bool keepsSupports) {
     bool changed = false;
     findLoads(w);
     const std::vector<double>& load = m_loads;
     for (Support& support : m_supports) {
         const auto& [row, velocity, weight, range] = support.contact;
+        if (keepsSupports && !range.isBounded()) continue;
         const double impulse = support.contact.impulseOn(w.col(support.body));
         const double slack = kPull * std::max(lightest(support.body) * kick, load[support.body]);
         if (!support.hold.turn(range, impulse, slack)) continue;

@@ -24,8 +24,9 @@ class BodySupports {
                std::span<const RigidContact> contacts, const std::vector<int>& dynamicIndex);
     /// Lets go of what would have to give more than it can, as contacts that pull, and takes hold of contacts that
     /// close, at the solved twists; true if any changed.
-    /// `kick`: what gravity does in the step [m/s].
-    bool update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, double kick);
+    /// `kick`: what gravity does in the step [m/s]. `keepsSupports`: what does not give way itself goes on holding
+    /// bodies, but for motors.
+    bool update(const Eigen::Matrix<double, 6, Eigen::Dynamic>& w, double kick, bool keepsSupports = false);
     /// Twists that impulses of shells lead to where contacts push only. The contacts are then as that leaves them.
     const Eigen::Matrix<double, 6, Eigen::Dynamic>& respond(const Eigen::Matrix<double, 6, Eigen::Dynamic>& impulses,
                                                             double kick);
