@@ -54,5 +54,16 @@ TEST(Held, ABlockOnAMotorPressesASheetOnAWall) {
         }
 }
 
+/// Vertices that are tied to light planks give way with them. Taken for immovable, they held the walker by penalties
+/// alone, 1 to 10 mm inside of it.
+TEST(Held, AWalkerOnARopeBridgeIsBorneByIt) {
+    const UseScene scene = use_scenes::ropeBridge("");
+    for (const double h : {1.0 / 60, 1.0 / 240}) {
+        const UseScene::Run run = scene.run("leather", 1, h);
+        EXPECT_EQ(run.outcome.fault(scene.fastest), nullptr) << run.outcome.deepest << " m deep at " << h;
+    }
+    EXPECT_LT(scene.run("denim", 1, 1.0 / 60).outcome.deepest, 5e-3);
+}
+
 }  // namespace
 }  // namespace jacket::bullet::testing

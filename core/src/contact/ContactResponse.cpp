@@ -716,7 +716,7 @@ SoftRow ContactResponse::makeRow(Touch& touch, const CoupledSystem& system) cons
     const Contact& c = touch.contact;
     const double pinched = pinchedMass(system, touch);
     touch.kappa = kRowPenalty * std::max(vertexStiffness(system, touch), pinched);
-    touch.bodyYields = pinched > 0.0 && isHeld(c);
+    touch.bothHeld = pinched > 0.0 && isHeld(c) && !m_input.bodies[c.body].supports.empty();
     touch.isPinched = isBetweenBodies(touch);
     SoftRow row;
     for (int a = 0; a < 3; ++a) row.vertices[a] = globalVertex(c, a);
@@ -874,7 +874,7 @@ bool ContactResponse::releasePulling(int round) {
 void ContactResponse::raiseMultiplier(Touch& touch) const {
     constexpr double kVain = 0.5;  // of what was missing
     const double missing = (touch.normalImpulse - touch.lambda) / touch.kappa;
-    const bool isWall = touch.dynamicBody < 0 || touch.bodyYields;
+    const bool isWall = touch.dynamicBody < 0 || touch.bothHeld;
     const bool isVain =
         isWall && touch.missed > 0.0 && missing > kVain * touch.missed && missing * m_input.h > m_vertexSlop;
     touch.isVain = touch.isVain || touch.jammed || isVain;

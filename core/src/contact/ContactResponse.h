@@ -122,13 +122,13 @@ class ContactResponse {
         int flips = 0;    ///< between sticking and sliding, in this step
         int changes = 0;  ///< how often it was activated or dropped
         bool active = false, sticks = false, isRow = false;
-        bool isPlaced = false;    ///< where the end of a solve found it
-        bool isVain = false;      ///< its multiplier does not help: others hold it where it is
-        bool bodyYields = false;  ///< a soft row of held vertices: see pinchedMass
-        bool isPinched = false;   ///< a soft row of vertices that another body holds
-        bool bounces = false;     ///< its target is that of restitution
-        bool jammed = false;      ///< walls on both sides leave it no room
-        bool pressed = false;     ///< a wall faces it: it is not to be kept off the surface
+        bool isPlaced = false;   ///< where the end of a solve found it
+        bool isVain = false;     ///< its multiplier does not help: others hold it where it is
+        bool bothHeld = false;   ///< something holds its vertices, and something else the body: see raiseMultiplier
+        bool isPinched = false;  ///< a soft row of vertices that another body holds
+        bool bounces = false;    ///< its target is that of restitution
+        bool jammed = false;     ///< walls on both sides leave it no room
+        bool pressed = false;    ///< a wall faces it: it is not to be kept off the surface
     };
     /// How exactly a step's contacts are settled; what remains is left to the next step.
     struct Care {
