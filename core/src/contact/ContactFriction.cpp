@@ -36,10 +36,10 @@ void ContactResponse::addFriction(const Touch& touch, Mat3& damping, Vec3& load)
 bool ContactResponse::updateFriction(const CoupledSystem& system) {
     if (++m_frictionRounds > kFrictionRounds) return loosenExcess(system);
     double most = 0.0;
-    for (const Touch& touch : m_touches) most = std::max(most, touch.contact.friction * touch.pressing);
+    for (const Touch& touch : m_touches) most = std::max(most, frictionLimit(touch));
     bool isWorthIt = false;
     for (Touch& touch : m_touches) {
-        const double limit = touch.contact.friction * touch.pressing;
+        const double limit = frictionLimit(touch);
         if (!touch.active || touch.jammed || limit <= 0.0) continue;
         const double matters = kFrictionChange * std::max(limit, kMinor * most);
         const double change = touch.sticks ? updateSticking(touch, matters, vertexStiffness(system, touch))
@@ -57,7 +57,7 @@ bool ContactResponse::updateFrictionQuickly(bool rough) {
     if (!rough && ++m_frictionRounds > m_mostFrictionRounds) return false;
     double sum = 0.0, fresh = 0.0, excess = 0.0;
     for (Touch& touch : m_touches) {
-        const double limit = touch.contact.friction * touch.pressing;
+        const double limit = frictionLimit(touch);
         if (!touch.active || touch.jammed || limit <= 0.0) continue;
         sum += limit;
         if (!touch.slip.known) fresh += limit;
@@ -75,14 +75,14 @@ bool ContactResponse::loosenExcess(const CoupledSystem& system) {
     double sum = 0.0, excess = 0.0;
     for (const Touch& touch : m_touches) {
         if (!touch.active || touch.jammed) continue;
-        const double limit = touch.contact.friction * std::max(touch.pressing, 0.0);
+        const double limit = frictionLimit(touch);
         sum += limit;
         if (touch.sticks) excess += std::max(0.0, heldBy(touch).norm() - limit);
     }
     if (excess <= kFarTooMuch * sum) return false;
     for (Touch& touch : m_touches) {
         const Vec3 held = heldBy(touch);
-        const double most = kMostFriction * touch.contact.friction * std::max(touch.pressing, 0.0);
+        const double most = kMostFriction * frictionLimit(touch);
         if (touch.active && !touch.jammed && touch.sticks && held.norm() > most)
             slideFrom(touch, held, vertexStiffness(system, touch));
     }
@@ -92,7 +92,7 @@ bool ContactResponse::loosenExcess(const CoupledSystem& system) {
 /// Friction that held by that impulse, which is more than its limit, gives its limit the same way. `stiffness`: impulse
 /// over velocity of its vertices [kg].
 void ContactResponse::slideFrom(Touch& touch, const Vec3& held, double stiffness) {
-    const double limit = touch.contact.friction * std::max(touch.pressing, 0.0), force = held.norm();
+    const double limit = frictionLimit(touch), force = held.norm();
     touch.sticks = false;
     touch.slip.known = true;
     touch.slip.limit = limit;
@@ -106,7 +106,7 @@ void ContactResponse::slideFrom(Touch& touch, const Vec3& held, double stiffness
 /// each other on for ever.
 void ContactResponse::updateCreeping(Touch& touch) const {
     Slip& slip = touch.slip;
-    const double speed = touch.slide.norm(), limit = touch.contact.friction * touch.pressing;
+    const double speed = touch.slide.norm(), limit = frictionLimit(touch);
     const bool turns = slip.known && touch.slide.dot(slip.direction) < 0.0;
     if (turns) ++touch.flips;
     const bool wasDamped = slip.known && slip.direction.isZero(0.0);
@@ -136,7 +136,7 @@ void ContactResponse::dropFriction(Touch& touch) {
 /// one would be thrown aside.
 void ContactResponse::dropExcessFriction() {
     for (Touch& touch : m_touches) {
-        const double force = heldBy(touch).norm(), limit = touch.contact.friction * std::max(touch.pressing, 0.0);
+        const double force = heldBy(touch).norm(), limit = frictionLimit(touch);
         if (!touch.active || force <= kMostFriction * limit) continue;
         dropFriction(touch);
     }
@@ -145,7 +145,7 @@ void ContactResponse::dropExcessFriction() {
 /// A contact slides once more holds it than friction can. Returns the change of its impulse [N s]; `matters`: what is
 /// worth another solve [N s]; `stiffness`: impulse over velocity of its vertices [kg].
 double ContactResponse::updateSticking(Touch& touch, double matters, double stiffness) const {
-    const double limit = touch.contact.friction * touch.pressing;
+    const double limit = frictionLimit(touch);
     const Vec3 held = heldBy(touch);
     const double force = held.norm();
     if (force <= limit + 0.05 * matters) {
@@ -178,7 +178,7 @@ double ContactResponse::updateSliding(Touch& touch, double matters, double stiff
     const Slip old = touch.slip;
     Slip& slip = touch.slip;
     slip.known = true;
-    slip.limit = touch.contact.friction * touch.pressing;
+    slip.limit = frictionLimit(touch);
     slip.speed = touch.slide.norm();
     const bool turns = old.known && touch.slide.dot(old.direction) <= 0.0;
     const bool turnsNext = !old.known && wouldTurn(touch, slip.limit, stiffness);

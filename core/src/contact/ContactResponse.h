@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <limits>
 #include <map>
 #include <memory_resource>
@@ -267,6 +268,8 @@ class ContactResponse {
     bool updateFrictionQuickly(bool rough);
     bool loosenExcess(const CoupledSystem& system);
     static void slideFrom(Touch& touch, const Vec3& held, double stiffness);
+    /// Coulomb's [N s].
+    static double frictionLimit(const Touch& touch) { return touch.contact.friction * std::max(touch.pressing, 0.0); }
     /// What a contact gives besides its normal impulse, and what the solve left over there [N s].
     static Vec3 heldBy(const Touch& touch) { return touch.impulse - touch.pressing * touch.contact.normal; }
     bool updateQuickly(const IslandVelocities& solved, const Points& y, int round, bool rough);
