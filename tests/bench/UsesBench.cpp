@@ -14,19 +14,16 @@ namespace {
 void tell(const UseScene& scene, int fineness) {
     UseScene::Run sum;
     int all = 0, faulty = 0;
-    for (const std::string& material : scene.materials)
-        for (const double h : {1.0 / 60, 1.0 / 240}) {
-            const UseScene::Run run = scene.run(material, fineness, h);
-            const char* const fault = run.outcome.fault(scene.fastest);
-            if (fault)
-                std::printf("  %-9s %s, 1/%.0f s: at most %.2g m/s, %.2g mm deep, %d unsettled\n", fault,
-                            material.c_str(), 1.0 / h, run.outcome.fastest, 1e3 * run.outcome.deepest,
-                            run.outcome.unsettled);
-            sum.add(run);
-            sum.fastestBody = std::max(sum.fastestBody, run.fastestBody);
-            faulty += fault ? 1 : 0;
-            ++all;
-        }
+    scene.runAll(fineness, [&](const UseScene::Run& run, const std::string& material, double h) {
+        const char* const fault = run.outcome.fault(scene.fastest);
+        if (fault)
+            std::printf("  %-9s %s, 1/%.0f s: at most %.2g m/s, %.2g mm deep, %d unsettled\n", fault, material.c_str(),
+                        1.0 / h, run.outcome.fastest, 1e3 * run.outcome.deepest, run.outcome.unsettled);
+        sum.add(run);
+        sum.fastestBody = std::max(sum.fastestBody, run.fastestBody);
+        faulty += fault ? 1 : 0;
+        ++all;
+    });
     std::printf(
         "%-32s %5.1f solves, at most %4d; %6.2f ms, at most %5.0f; sheet at most %5.2f m/s, bodies %5.2f; "
         "%d of %d go wrong\n",

@@ -80,6 +80,12 @@ inline std::vector<int> verticesWhere(const ShellBody& sheet, const std::functio
         if (is(sheet.shell().positions().col(i))) vertices.push_back(i);
     return vertices;
 }
+inline void pinWhere(ShellBody& sheet, const std::function<bool(const Vec3&)>& is) {
+    for (const int i : verticesWhere(sheet, is)) sheet.pin(i);
+}
+inline void anchorWhere(ShellBody& sheet, btRigidBody& body, const std::function<bool(const Vec3&)>& is) {
+    for (const int i : verticesWhere(sheet, is)) sheet.anchor(i, body);
+}
 inline bool isOnPole(const Vec3& x) {
     return x.x() < kHair;
 }
@@ -125,7 +131,7 @@ inline EmbeddedScene curtain(const char* name) {
                 scene.shells->setWind({.velocity = Vec3(1, 0, 3)});
                 auto& ceiling = scene.addBody(makeBox(1, 0.1, 1), 0.0, btVector3(0, btScalar(kTop), 0));
                 auto& sheet = addHanging(scene, material, cells);
-                for (const int i : verticesWhere(sheet, isAtTop)) sheet.pin(i);
+                pinWhere(sheet, isAtTop);
                 return {sheet, ceiling};
             }};
 }
@@ -135,7 +141,7 @@ inline EmbeddedScene awning(const char* name) {
     return {name, 6.0, [](BulletScene& scene, const ShellMaterial& material, int cells) -> EmbeddedScene::Held {
                 auto& wall = scene.addBody(makeBox(0.1, 1, 1), 0.0, btVector3(btScalar(-0.05), 1, 0));
                 auto& sheet = addLying(scene, material, cells, Vec3(0.5 * kSide, 1.5, 0));
-                for (const int i : verticesWhere(sheet, isOnPole)) sheet.pin(i);
+                pinWhere(sheet, isOnPole);
                 return {sheet, wall};
             }};
 }
@@ -175,7 +181,7 @@ inline EmbeddedScene ballInSheet(const char* name, double radius, double within)
                 auto& sheet = addLying(scene, material, cells, Vec3(0, 1, 0));
                 pinBorder(sheet);
                 const auto isIn = [=](const Vec3& x) { return (x - Vec3(0, 1, 0)).norm() < within; };
-                for (const int i : verticesWhere(sheet, isIn)) sheet.anchor(i, ball);
+                anchorWhere(sheet, ball, isIn);
                 return {sheet, ball};
             }};
 }
@@ -186,8 +192,8 @@ inline EmbeddedScene hangingBlock(const char* name) {
                 auto& block = scene.addBody(makeBox(0.32, 0.1, 0.1), 5.0,
                                             btVector3(btScalar(0.5 * kSide), btScalar(kTop - kSide), 0));
                 auto& sheet = addHanging(scene, material, cells);
-                for (const int i : verticesWhere(sheet, isAtTop)) sheet.pin(i);
-                for (const int i : verticesWhere(sheet, isAtBottom)) sheet.anchor(i, block);
+                pinWhere(sheet, isAtTop);
+                anchorWhere(sheet, block, isAtBottom);
                 return {sheet, block};
             }};
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/UseScene.h"
@@ -16,13 +17,6 @@ namespace jacket::bullet::testing::use_scenes {
 
 inline const btQuaternion kAlongX(btVector3(0, 0, 1), SIMD_HALF_PI), kAlongZ(btVector3(1, 0, 0), SIMD_HALF_PI);
 
-/// A capsule's length is that of its cylinder, along its own y [m].
-inline btRigidBody& addCapsule(BulletScene& scene, double radius, double length, double mass, const btVector3& at,
-                               const btQuaternion& turn = btQuaternion::getIdentity()) {
-    auto& body = scene.addBody(std::make_unique<btCapsuleShape>(btScalar(radius), btScalar(length)), mass, at);
-    moveTo(body, at, turn);
-    return body;
-}
 inline btVector3 localOf(const btRigidBody& body, const btVector3& at) {
     return body.getWorldTransform().inverse() * at;
 }
@@ -46,12 +40,6 @@ inline void driveAlongZ(BulletScene& scene, btRigidBody& body, double speed, dou
     slider->setLowerAngLimit(0);
     slider->setUpperAngLimit(0);
     scene.addJoint(std::move(slider));
-}
-inline void anchorWhere(ShellBody& sheet, btRigidBody& body, const std::function<bool(const Vec3&)>& isThere) {
-    for (const int i : verticesWhere(sheet, isThere)) sheet.anchor(i, body);
-}
-inline void pinWhere(ShellBody& sheet, const std::function<bool(const Vec3&)>& isThere) {
-    for (const int i : verticesWhere(sheet, isThere)) sheet.pin(i);
 }
 
 /// A block of 30 kg on a slider whose motor of 3 kN drives it into a sheet that hangs in front of a wall.
@@ -92,13 +80,10 @@ inline UseScene ropeBridge(const char* name) {
                     anchorWhere(strip, plank, [k](const Vec3& x) { return std::abs(x.x() - 0.25 * k) < 1e-3; });
                     bodies.push_back(&plank);
                 }
-                auto& walker = addCapsule(scene, 0.2, 0.8, 60.0, vector(-0.9, 1.7, 0));
-                walker.setAngularFactor(0);
-                walker.setActivationState(DISABLE_DEACTIVATION);
+                auto& walker = addWalker(scene, 0.2, 0.8, 60.0, vector(-0.9, 1.7, 0));
                 bodies.push_back(&walker);
                 return {strip, bodies, [&walker](double t) {
-                            const double fall = double(walker.getLinearVelocity().y());
-                            if (t > 1.0) walker.setLinearVelocity(vector(0.6, fall, 0));
+                            if (t > 1.0) walk(walker, 0.6, 0.0);
                         }};
             }};
 }

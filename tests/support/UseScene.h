@@ -29,6 +29,13 @@ struct UseScene {
     /// `fineness`: 1, 2, ...
     std::function<Things(BulletScene&, const ShellMaterial&, int fineness)> make;
 
+    /// `use(run, material, h)`: of each of its materials, in steps of 1/60 and 1/240 s.
+    template <class Use>
+    void runAll(int fineness, Use use) const {
+        for (const std::string& material : materials)
+            for (const double h : {1.0 / 60, 1.0 / 240}) use(run(material, fineness, h), material, h);
+    }
+
     Run run(const std::string& material, int fineness, double h) const {
         BulletScene scene;
         const Things things = make(scene, materials::byName(material), fineness);
@@ -46,6 +53,8 @@ struct UseScene {
 namespace use_scenes {
 
 using Things = UseScene::Things;
+using embedded_scenes::anchorWhere;
+using embedded_scenes::pinWhere;
 using embedded_scenes::verticesWhere;
 
 inline btVector3 vector(double x, double y, double z) {
@@ -59,6 +68,24 @@ inline btRigidBody& addBall(BulletScene& scene, double radius, double mass, cons
 }
 inline void moveTo(btRigidBody& body, const btVector3& at, const btQuaternion& turn = btQuaternion::getIdentity()) {
     body.setWorldTransform(btTransform(turn, at));
+}
+/// Its length is that of its cylinder, along its own y [m].
+inline btRigidBody& addCapsule(BulletScene& scene, double radius, double length, double mass, const btVector3& at,
+                               const btQuaternion& turn = btQuaternion::getIdentity()) {
+    auto& body = scene.addBody(std::make_unique<btCapsuleShape>(btScalar(radius), btScalar(length)), mass, at);
+    moveTo(body, at, turn);
+    return body;
+}
+/// A character: a capsule that is kept upright and awake, for its user to walk.
+inline btRigidBody& addWalker(BulletScene& scene, double radius, double length, double mass, const btVector3& at) {
+    auto& walker = addCapsule(scene, radius, length, mass, at);
+    walker.setAngularFactor(0);
+    walker.setActivationState(DISABLE_DEACTIVATION);
+    return walker;
+}
+/// By its velocity along x and z; it falls as it does.
+inline void walk(btRigidBody& walker, double x, double z) {
+    walker.setLinearVelocity(vector(x, double(walker.getLinearVelocity().y()), z));
 }
 inline TriangleMesh moved(TriangleMesh mesh, const Vec3& by) {
     mesh.positions.colwise() += by;

@@ -59,7 +59,7 @@ inline UseScene doorAndCurtain(const char* name, double top) {
                 scene.addJoint(std::move(hinge));
                 auto& curtain =
                     scene.shells->add(upright(1.6, 1.6, 12 * fineness, 12 * fineness, {0.3, 1.1, 0.0}), material);
-                for (const int i : verticesWhere(curtain, [](const Vec3& x) { return x.y() > 1.899; })) curtain.pin(i);
+                pinWhere(curtain, [](const Vec3& x) { return x.y() > 1.899; });
                 return {curtain, {&door}};
             }};
 }
@@ -68,17 +68,11 @@ inline UseScene doorAndCurtain(const char* name, double top) {
 inline UseScene walkerAndCurtain(const char* name) {
     return {name, 3.0, 8.0, kSoft, [](auto& scene, auto& material, int fineness) -> Things {
                 auto& floor = scene.addFloor();
-                auto& walker = scene.addBody(std::make_unique<btCapsuleShape>(btScalar(0.25), btScalar(1.2)), 70.0,
-                                             vector(0.05, 0.86, -1.2));
-                walker.setAngularFactor(0);
-                walker.setActivationState(DISABLE_DEACTIVATION);
+                auto& walker = addWalker(scene, 0.25, 1.2, 70.0, vector(0.05, 0.86, -1.2));
                 auto& curtain =
                     scene.shells->add(upright(1.8, 1.8, 12 * fineness, 12 * fineness, {0.0, 1.1, 0.0}), material);
-                for (const int i : verticesWhere(curtain, [](const Vec3& x) { return x.y() > 1.999; })) curtain.pin(i);
-                return {curtain, {&floor, &walker}, [&walker](double t) {
-                            const double fall = double(walker.getLinearVelocity().y());
-                            walker.setLinearVelocity(vector(0, fall, t < 1.6 ? 1.5 : -1.5));
-                        }};
+                pinWhere(curtain, [](const Vec3& x) { return x.y() > 1.999; });
+                return {curtain, {&floor, &walker}, [&walker](double t) { walk(walker, 0.0, t < 1.6 ? 1.5 : -1.5); }};
             }};
 }
 
@@ -185,10 +179,8 @@ inline UseScene bola(const char* name) {
                     material);
                 auto& left = addBall(scene, 0.05, 0.3, vector(-0.45, 1, 0), vector(2, 2, 5));
                 auto& right = addBall(scene, 0.05, 0.3, vector(0.45, 1, 0), vector(2, 2, -3));
-                for (const int i : verticesWhere(strip, [](const Vec3& x) { return x.x() < -0.399; }))
-                    strip.anchor(i, left);
-                for (const int i : verticesWhere(strip, [](const Vec3& x) { return x.x() > 0.399; }))
-                    strip.anchor(i, right);
+                anchorWhere(strip, left, [](const Vec3& x) { return x.x() < -0.399; });
+                anchorWhere(strip, right, [](const Vec3& x) { return x.x() > 0.399; });
                 return {strip, {&scene.addFloor(), &left, &right}};
             }};
 }
@@ -210,8 +202,8 @@ inline UseScene tent(const char* name) {
                 auto& sheet = scene.shells->add(moved(squareSheet(1.2, 10 * fineness), {0, 0.6, 0}), material);
                 Bodies bodies{&scene.addFloor()};
                 for (const double turn : {0.0, 2.1, 4.2})
-                    bodies.push_back(&scene.addBody(std::make_unique<btCapsuleShape>(btScalar(0.02), btScalar(0.5)),
-                                                    0.0, vector(0.3 * std::cos(turn), 0.25, 0.3 * std::sin(turn))));
+                    bodies.push_back(
+                        &addCapsule(scene, 0.02, 0.5, 0.0, vector(0.3 * std::cos(turn), 0.25, 0.3 * std::sin(turn))));
                 return {sheet, bodies};
             }};
 }
