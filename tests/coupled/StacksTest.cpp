@@ -10,6 +10,7 @@
 #include "support/FreeScenes.h"
 #include "support/HardScenes.h"
 #include "support/PlateScene.h"
+#include "support/PressedScenes.h"
 #include "support/Random.h"
 
 namespace jacket::bullet::testing {
@@ -240,6 +241,34 @@ TEST(BoxesInAHammock, TakeOthersThatFallOntoThem) {
         EXPECT_GT(run.lowest, 0.9) << "start " << start;
     }
 }
+
+/// A ball of 50 kg on a sheet on rails, which it presses on by the insides of triangles and they by edges: each row
+/// that takes it by the stiffness of the cloth alone would bear a hundredth of it a round. Material, mass of a rail,
+/// steps a second.
+class BallOnRails : public ::testing::TestWithParam<std::tuple<std::string, double, double>> {};
+
+TEST_P(BallOnRails, IsBorneThroughASheet) {
+    const auto& [material, railMass, rate] = GetParam();
+    BulletScene scene;
+    const auto [sheet, bodies, move] = use_scenes::makeRails(scene, materials::byName(material), 4, 50.0, railMass);
+    const btRigidBody& ball = *bodies.back();
+    SheetRun run;
+    Vec3 impulse = Vec3::Zero();
+    for (int i = 0; i < int(rate); ++i) {
+        run.step(scene, sheet, 1.0 / rate, [&] { return deepestIn(bodies, sheet); });
+        if (2 * i >= int(rate)) impulse += jacket::testing::contactImpulse(sheet, ball);
+    }
+    EXPECT_LE(run.outcome.unsettled, 2);
+    EXPECT_LT(run.outcome.deepest, rate < 100.0 ? 1e-3 : 2e-4);
+    EXPECT_NEAR(impulse.y() / (0.5 * 50.0 * 9.81), 1.0,
+                railMass > 0.0 ? 0.15 : 0.05);  // what it weighs in half a second
+}
+INSTANTIATE_TEST_SUITE_P(Fixed, BallOnRails,
+                         ::testing::Combine(::testing::Values("cotton", "rubber", "paper"), ::testing::Values(0.0),
+                                            ::testing::Values(60.0, 240.0)));
+INSTANTIATE_TEST_SUITE_P(Free, BallOnRails,
+                         ::testing::Combine(::testing::Values("cotton", "rubber", "paper"), ::testing::Values(20.0),
+                                            ::testing::Values(240.0)));
 
 /// Three flat boxes fall a little into a sheet that is held along two edges, and stay a stack.
 TEST(Stack, StandsInAHammock) {

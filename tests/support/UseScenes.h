@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "support/MechanismScenes.h"
+#include "support/PressedScenes.h"
 #include "support/UseScene.h"
 
 namespace jacket::bullet::testing::use_scenes {
@@ -225,7 +226,7 @@ inline std::vector<UseScene> all() {
                                  bola("two balls on a strip"),
                                  lid("lid on a box"),
                                  tent("sheet on three poles")};
-    for (const UseScene& scene : mechanisms()) scenes.push_back(scene);
+    for (const auto& more : {mechanisms(), pressed()}) scenes.insert(scenes.end(), more.begin(), more.end());
     return scenes;
 }
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "contact/ContactResponse.h"
 
@@ -139,21 +140,72 @@ double ContactResponse::pinchedMass(const CoupledSystem& system, const Touch& to
     return 1.0 / (isAnyFree ? ofBodies + ofVertices : ofBodies);
 }
 
-/// Whether neither side of a contact gives way: something holds its vertices, and what bears the free body, or joins it
-/// to others, holds that. How deep the one is in the other is then not to be taken back: made exact, the impulses that
-/// this takes would grow without bound.
-bool ContactResponse::isWedged(const Touch& touch) const {
+/// Soft rows by each of their vertices, where free bodies may press shells on something.
+void ContactResponse::findRowsByVertex() {
+    m_rowsByVertex.clear();
+    if (!hasFreeBodies()) return;
+    for (const Touch& touch : m_touches)
+        for (int a = 0; a < 3 && touch.isRow; ++a)
+            if (touch.contact.weights[a] > 0.0) m_rowsByVertex.emplace(globalVertex(touch.contact, a), &touch);
+}
+
+/// How heavy is what a soft row and another one from the other side press on each other through the shell, if either's
+/// body gives way. Both are to bear it: by the stiffness of the shell alone, multipliers would take as many rounds as
+/// it is heavier. 0: nothing does [kg].
+double ContactResponse::pressedMass(const Touch& touch) const {
+    double most = 0.0;
+    for (int a = 0; a < 3 && !m_rowsByVertex.empty(); ++a) {
+        if (touch.contact.weights[a] == 0.0) continue;
+        const auto [first, last] = m_rowsByVertex.equal_range(globalVertex(touch.contact, a));
+        for (auto known = first; known != last; ++known) {
+            const Touch& other = *known->second;
+            if (other.contact.body == touch.contact.body || !isFacing(other.contact, touch.contact)) continue;
+            const double mass = massBetween(touch, other);
+            if (mass > most && (mayYield(touch) || mayYield(other))) most = mass;
+        }
+    }
+    return most;
+}
+
+/// Of the lighter of two bodies that face each other. Two free ones bear each other by the vertices between them, if a
+/// contact holds any [kg].
+double ContactResponse::massBetween(const Touch& touch, const Touch& other) const {
+    const bool areFree = touch.dynamicBody >= 0 && other.dynamicBody >= 0;
+    if (areFree && (hasTakenVertex(touch) || hasTakenVertex(other))) return 0.0;
+    double mass = std::numeric_limits<double>::infinity();
+    for (const Touch* one : {&touch, &other})
+        if (one->dynamicBody >= 0) mass = std::min(mass, m_input.bodies[one->contact.body].lightest());
+    return mass;
+}
+
+/// Whether a contact of its own holds a vertex of a soft row.
+bool ContactResponse::hasTakenVertex(const Touch& row) const {
+    for (int a = 0; a < 3; ++a)
+        if (row.contact.weights[a] > 0.0 && m_filterOf[globalVertex(row.contact, a)] >= 0) return true;
+    return false;
+}
+
+/// Whether a contact's body gives way to it: nothing that bears it, or joins it to others, holds it from behind.
+bool ContactResponse::mayYield(const Touch& touch) const {
     constexpr double kMuchHeavier = 100.0;  // than the body alone
+    if (touch.dynamicBody < 0) return false;
     const CoupledBody& body = m_input.bodies[touch.contact.body];
-    if (touch.dynamicBody < 0 || body.supports.empty() || !isHeld(touch.contact)) return false;
     Mat6 mass = body.mass;
     for (const BodySupport& support : body.supports) {
         const bool isAlong = support.row.dot(rowOf(touch, touch.contact.normal)) > 0.0;
         const double most = isAlong ? support.range.most : -support.range.least;
         if (!std::isinf(most)) mass -= support.weight * support.row * support.row.transpose();
     }
-    return bodyInertia(mass, touch, touch.contact.normal) >
+    return bodyInertia(mass, touch, touch.contact.normal) <=
            kMuchHeavier * bodyInertia(body.ownMass(), touch, touch.contact.normal);
+}
+
+/// Whether neither side of a contact gives way: something holds its vertices, and what bears the free body, or joins it
+/// to others, holds that. How deep the one is in the other is then not to be taken back: made exact, the impulses that
+/// this takes would grow without bound.
+bool ContactResponse::isWedged(const Touch& touch) const {
+    const bool isBorne = touch.dynamicBody >= 0 && !m_input.bodies[touch.contact.body].supports.empty();
+    return isBorne && isHeld(touch.contact) && !mayYield(touch);
 }
 
 /// Whether a contact of a free body has a vertex that another one holds.

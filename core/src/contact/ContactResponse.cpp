@@ -598,6 +598,7 @@ void ContactResponse::writeTo(CoupledSystem& system) {
         touch.isRow = touch.active && !joinFilter(static_cast<int>(i));
     }
     findJams();
+    findRowsByVertex();
     for (Touch& touch : m_touches)  // after them, as what holds their vertices matters
         if (touch.isRow) m_rows.push_back(makeRow(touch, system));
     for (auto& filter : m_filters) finishFilter(filter, m_constraints[filter.constraint]);
@@ -715,7 +716,7 @@ double ContactResponse::vertexStiffness(const CoupledSystem& system, const Touch
 SoftRow ContactResponse::makeRow(Touch& touch, const CoupledSystem& system) const {
     const Contact& c = touch.contact;
     const double pinched = pinchedMass(system, touch);
-    touch.kappa = kRowPenalty * std::max(vertexStiffness(system, touch), pinched);
+    touch.kappa = kRowPenalty * std::max({vertexStiffness(system, touch), pinched, pressedMass(touch)});
     touch.bothHeld = pinched > 0.0 && isHeld(c) && !m_input.bodies[c.body].supports.empty();
     touch.isPinched = isBetweenBodies(touch);
     SoftRow row;

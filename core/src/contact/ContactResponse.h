@@ -257,6 +257,11 @@ class ContactResponse {
     bool isBetweenBodies(const Touch& touch) const;
     bool isWedged(const Touch& touch) const;
     double pinchedMass(const CoupledSystem& system, const Touch& touch) const;
+    void findRowsByVertex();
+    double massBetween(const Touch& touch, const Touch& other) const;
+    bool hasTakenVertex(const Touch& row) const;
+    bool mayYield(const Touch& touch) const;
+    double pressedMass(const Touch& touch) const;
     double vertexStiffness(const CoupledSystem& system, const Touch& touch) const;
     void letGo(Touch& touch) const;
     bool releasePulling(int round);
@@ -364,6 +369,7 @@ class ContactResponse {
     std::vector<int> m_filterOf;  ///< per vertex, -1: none
     std::vector<VertexConstraint> m_constraints;
     std::vector<SoftRow> m_rows;
+    std::pmr::multimap<int, const Touch*> m_rowsByVertex{&m_pool};
     std::vector<Touch*> m_rowsAtWalls;  ///< soft rows of prescribed bodies: see findJams
     std::vector<Push> m_pushes;
     std::pmr::map<int, Vec3> m_pushed{&m_pool};           ///< by what pushOut has moved vertices [m]
