@@ -5,12 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <utility>
 #include <vector>
 
 #include "support/UseScene.h"
 
-/// Shells between bodies that rest on each other, by their faces more than by their vertices.
+/// Shells that bodies press, mostly on other bodies: by their faces more than by their vertices.
 namespace jacket::bullet::testing::use_scenes {
 
 /// Two rails of 10 cm, of `railMass` each (0: fixed), a sheet of large cells over them, and a ball of `mass` let down
@@ -86,14 +85,9 @@ inline UseScene pulledCloth(const char* name) {
                 auto& cloth = scene.shells->add(
                     moved(makeGrid({.size = {1.1, 0.7}, .cells = {22 * fineness, 14 * fineness}}), {0, 0.802, 0}),
                     material, {.friction = 0.3});
-                std::vector<std::pair<int, btVector3>> edge;
-                for (const int vertex : verticesWhere(cloth, [](const Vec3& x) { return x.x() > 0.549; })) {
-                    cloth.pin(vertex);
-                    edge.emplace_back(vertex, cloth.positions()[vertex]);
-                }
+                const Pins edge = pinAll(cloth, verticesWhere(cloth, [](const Vec3& x) { return x.x() > 0.549; }));
                 return {cloth, bodies, [=, &cloth](double t) {
-                            const double pulled = std::clamp(4.0 * (t - 0.8), 0.0, 1.6);
-                            for (const auto& [vertex, at] : edge) cloth.movePin(vertex, at + vector(pulled, 0, 0));
+                            movePins(cloth, edge, vector(std::clamp(4.0 * (t - 0.8), 0.0, 1.6), 0, 0));
                         }};
             }};
 }

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/EmbeddedScenes.h"
@@ -86,6 +87,19 @@ inline btRigidBody& addWalker(BulletScene& scene, double radius, double length, 
 /// By its velocity along x and z; it falls as it does.
 inline void walk(btRigidBody& walker, double x, double z) {
     walker.setLinearVelocity(vector(x, double(walker.getLinearVelocity().y()), z));
+}
+/// Pins that their user moves together, by vertex, and where they were.
+using Pins = std::vector<std::pair<int, btVector3>>;
+inline Pins pinAll(ShellBody& sheet, const std::vector<int>& vertices) {
+    Pins pins;
+    for (const int vertex : vertices) {
+        sheet.pin(vertex);
+        pins.emplace_back(vertex, sheet.positions()[vertex]);
+    }
+    return pins;
+}
+inline void movePins(ShellBody& sheet, const Pins& pins, const btVector3& by) {
+    for (const auto& [vertex, at] : pins) sheet.movePin(vertex, at + by);
 }
 inline TriangleMesh moved(TriangleMesh mesh, const Vec3& by) {
     mesh.positions.colwise() += by;

@@ -153,22 +153,16 @@ inline UseScene bag(const char* name) {
         {"cotton", "denim", "rubber", "leather"},
         [](auto& scene, auto& material, int fineness) -> Things {
             auto& sheet = scene.shells->add(moved(bowl(0.25, 5 * fineness), {0, 0.75, 0}), material);
-            std::vector<int> rim;
-            std::vector<btVector3> at;
-            for (int i = 0; i < sheet.vertexCount(); ++i) {
-                if (!sheet.shell().mesh().isBorderVertex(i)) continue;
-                sheet.pin(i);
-                rim.push_back(i);
-                at.push_back(sheet.positions()[i]);
-            }
+            std::vector<int> border;
+            for (int i = 0; i < sheet.vertexCount(); ++i)
+                if (sheet.shell().mesh().isBorderVertex(i)) border.push_back(i);
+            const Pins rim = pinAll(sheet, border);
             Bodies bodies;
             for (int i = 0; i < 6; ++i)
                 bodies.push_back(&addBall(
                     scene, 0.06, 0.2, vector(0.09 * std::cos(1.05 * i), 0.95 + 0.02 * i, 0.09 * std::sin(1.05 * i))));
-            return {sheet, bodies, [=, &sheet](double t) {
-                        for (std::size_t k = 0; k < rim.size(); ++k)
-                            sheet.movePin(rim[k], at[k] + vector(0.3 - 0.3 * std::cos(3.0 * t), 0, 0));
-                    }};
+            return {sheet, bodies,
+                    [=, &sheet](double t) { movePins(sheet, rim, vector(0.3 - 0.3 * std::cos(3.0 * t), 0, 0)); }};
         }};
 }
 

@@ -167,8 +167,8 @@ double ContactResponse::pressedMass(const Touch& touch) const {
     return most;
 }
 
-/// Of the lighter of two bodies that face each other. Two free ones bear each other by the vertices between them, if a
-/// contact holds any [kg].
+/// Of the lighter of two bodies that face each other, infinite if neither is free. Two free ones bear each other by the
+/// vertices between them, if a contact holds any: it is 0 then [kg].
 double ContactResponse::massBetween(const Touch& touch, const Touch& other) const {
     const bool areFree = touch.dynamicBody >= 0 && other.dynamicBody >= 0;
     if (areFree && (hasTakenVertex(touch) || hasTakenVertex(other))) return 0.0;
